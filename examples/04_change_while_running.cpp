@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Adds and removes DAGs while others run, and stops on Ctrl-C.
-#include <csignal>
 #include <cstdio>
 
 #include "redag/redag.hpp"
@@ -10,15 +9,8 @@
 using namespace std::chrono_literals;
 using namespace redag::runtime;
 
-namespace {
-Executor *running = nullptr;
-}
-
 int main() {
   Executor executor;
-  running = &executor;
-  std::signal(SIGINT, [](int) { running->request_stop(); });
-
   redag::DagId inspection;  // the DAG of the mode that is switched on and off
   bool inspecting = false;
   int seconds = 0;
@@ -38,5 +30,6 @@ int main() {
     if (++seconds == 6) executor.stop();
   });
   executor.add(std::move(supervisor));
-  executor.run();
+  const int signal = executor.run_until_signal();
+  std::printf("stopped by %s\n", signal == 0 ? "itself" : "a signal");
 }

@@ -22,13 +22,16 @@ class HistogramCounts {
   static constexpr unsigned kOctaves = 44;
   static constexpr std::size_t kBuckets = std::size_t{kOctaves} << kBits;
 
-  [[nodiscard]] std::uint64_t total() const noexcept {
-    std::uint64_t total = 0;
-    for (const std::uint32_t bucket : buckets_) total += bucket;
-    return total;
-  }
+  [[nodiscard]] std::uint64_t total() const noexcept { return count_in(0, kBuckets); }
   /// The longest value ever added, even if these are the counts of a part.
   [[nodiscard]] Duration longest() const noexcept { return longest_; }
+
+  /// How many values are in the buckets [first, last).
+  [[nodiscard]] std::uint64_t count_in(std::size_t first, std::size_t last) const noexcept {
+    std::uint64_t total = 0;
+    for (std::size_t i = first; i < std::min(last, kBuckets); ++i) total += buckets_[i];
+    return total;
+  }
 
   /// Returns the smallest bound that at least `share` of the values do not exceed; 0 without values.
   [[nodiscard]] Duration percentile(double share) const noexcept {

@@ -27,12 +27,20 @@ constexpr std::array kDagRemedies = {
     Remedy{Field::MaxActive, "change DagOptions::max_active; 0 means no bound"},
     Remedy{Field::MaxPending, "change DagOptions::max_pending; 0 means no bound"},
     Remedy{Field::Criticality, "DagOptions::criticality"},
+    Remedy{Field::Deadline, "change DagOptions::deadline; 0 means none"},
+    Remedy{Field::Degrade, "change DagOptions::degrade"},
 };
 
 constexpr std::array kTaskRemedies = {
     Remedy{Field::Name, "change the first argument"},
     Remedy{Field::Wcet, "change TaskOptions::wcet; 0 means unknown"},
-    Remedy{Field::Period, "change the second argument of timer()"},
+    Remedy{Field::Bcet, "change TaskOptions::bcet; 0 means unknown"},
+    Remedy{Field::WcetLow, "change TaskOptions::wcet_low, or set DagOptions::criticality to Criticality::High"},
+    Remedy{Field::Jitter, "change TaskOptions::jitter, which only timer() uses"},
+    Remedy{Field::Region, "change TaskOptions::region; 0 means the whole job"},
+    Remedy{Field::OnBudget, "TaskOptions::on_budget"},
+    Remedy{Field::Concurrency, "change TaskOptions::concurrency; with a group it is 1"},
+    Remedy{Field::Execution, "change TaskOptions::execution; it needs a wcet"},
     Remedy{Field::Deadline, "change TaskOptions::deadline; 0 means the period"},
     Remedy{Field::Offset, "change TaskOptions::offset, which only timer() uses"},
     Remedy{Field::Budget, "change TaskOptions::budget; 0 means none"},
@@ -48,9 +56,15 @@ std::string text_in_quotes(std::string_view text) {
   return name;
 }
 
-std::string remedy_for(const Finding &finding, const Task *task) {
+// The member of DagBuilder that made a task.
+const char *call_of(const Task &task, bool is_event) { return is_event ? "event" : to_string(task.activation); }
+
+std::string remedy_for(const Finding &finding, const Task *task, bool is_event) {
   if (task != nullptr && finding.field == Field::After) {
     return task->activation == Activation::Data ? "change the second argument of data()" : "TaskOptions::after";
+  }
+  if (task != nullptr && finding.field == Field::Period) {
+    return is_event ? "change the second argument of event()" : "change the second argument of timer()";
   }
   const auto find = [&](const auto &remedies) -> std::string {
     const auto *const found = std::find_if(remedies.begin(), remedies.end(),
@@ -60,14 +74,16 @@ std::string remedy_for(const Finding &finding, const Task *task) {
   return task != nullptr ? find(kTaskRemedies) : find(kDagRemedies);
 }
 
-std::string describe(const Finding &finding, const Dag &dag) {
+std::string describe(const Finding &finding, const Dag &dag, const std::vector<bool> &events) {
   const Task *task = finding.task == Finding::kNone ? nullptr : &dag.tasks[finding.task];
+  const bool is_event = task != nullptr && events[finding.task];
   std::string message = finding.message;
   // In a file a period of 0 means that it is absent. Here the caller passed it.
   if (task != nullptr && finding.field == Field::Period && task->period == 0)
-    message = "the period must be greater than 0";
-  const std::string place = task == nullptr ? place_of(dag.name) : place_of(dag.name, task->activation, task->name);
-  const std::string remedy = remedy_for(finding, task);
+    message = is_event ? "the minimum interval must be greater than 0" : "the period must be greater than 0";
+  const std::string place =
+      task == nullptr ? place_of(dag.name) : place_of(dag.name, call_of(*task, is_event), task->name);
+  const std::string remedy = remedy_for(finding, task, is_event);
   return printable(fmt::format("{}: {}{}", place, message, remedy.empty() ? "" : " (" + remedy + ")"));
 }
 
@@ -75,27 +91,40 @@ std::string describe(const Finding &finding, const Dag &dag) {
 
 std::string place_of(std::string_view dag) { return fmt::format("DagBuilder({})", text_in_quotes(dag)); }
 
-std::string place_of(std::string_view dag, Activation activation, std::string_view task) {
-  return fmt::format("{}.{}({})", place_of(dag), to_string(activation), text_in_quotes(task));
+std::string place_of(std::string_view dag, std::string_view call, std::string_view task) {
+  return fmt::format("{}.{}({})", place_of(dag), call, text_in_quotes(task));
 }
 
-std::string mistakes_of(const Dag &dag, PolicyKind policy) {
+std::string mistakes_of(const Dag &dag, const std::vector<bool> &is_event, PolicyKind policy) {
   Workload alone;
   alone.platform = Platform{1, PreemptionMode::None};
   alone.policy = policy;
   alone.dags = {dag};
   for (Task &task : alone.dags[0].tasks) {
-    if (task.wcet == 0) task.wcet = 1;  // a wcet may be unknown here
+    if (task.wcet == 0) task.wcet = std::max({Duration{1}, task.bcet, task.wcet_low});  // may be unknown here
   }
   std::string text;
   const auto add = [&](const std::string &mistake) { text += (text.empty() ? "" : "\n") + mistake; };
   for (const Finding &finding : find_mistakes(alone)) {
-    if (finding.severity == Severity::Error) add(describe(finding, dag));
+    if (finding.severity == Severity::Error) add(describe(finding, dag, is_event));
   }
-  for (const Task &task : dag.tasks) {
-    if (task.overrun == Overrun::Queue || task.queue_depth == 1) continue;
-    add(place_of(dag.name, task.activation, task.name) +
-        ": TaskOptions::queue_depth has no effect without a queue (set TaskOptions::overrun to Overrun::Queue)");
+  for (std::size_t i = 0; i < dag.tasks.size(); ++i) {
+    const Task &task = dag.tasks[i];
+    const std::string place = place_of(dag.name, call_of(task, is_event[i]), task.name);
+    if (task.overrun != Overrun::Queue && task.queue_depth != 1) {
+      add(place +
+          ": TaskOptions::queue_depth has no effect without a queue (set TaskOptions::overrun to Overrun::Queue)");
+    }
+    if (task.activation != Activation::Timer) continue;
+    // Such tasks would be aligned (docs/model.md): job k would wait for a job with the very same release.
+    for (const std::uint32_t predecessor : task.predecessors) {
+      const Task &event = dag.tasks[predecessor];
+      if (!is_event[predecessor] || event.period != task.period || event.offset != task.offset) continue;
+      add(
+          fmt::format("{}: it waits for jobs of {} that are released at the same instants, which an event cannot "
+                      "promise (use data(), or set TaskOptions::offset)",
+                      place, text_in_quotes(event.name)));
+    }
   }
   return text;
 }

@@ -14,6 +14,7 @@
 #include "redag/runtime/engine_locked.hpp"
 #include "redag/runtime/preemption_point.hpp"
 #include "redag/runtime/threads.hpp"
+#include "redag/trace/tap.hpp"
 
 namespace redag::runtime {
 
@@ -214,9 +215,13 @@ void Engine::look_out() noexcept {
 void Engine::decide(Locked &locked, Time now, Taker *taker) {
   // While paused, only run_one() starts a job, on the caller's thread.
   const std::uint32_t for_caller = taker != nullptr && &taker->thread == &pool_.caller() ? 1 : 0;
-  const sched::Step step = scheduler_->dispatch(now, may_start() ? sched::kNoLimit : for_caller);
+  carry_out(locked, scheduler_->dispatch(now, may_start() ? sched::kNoLimit : for_caller), now, taker);
+}
+
+// Passes a step of the scheduler on to the threads.
+void Engine::carry_out(Locked &locked, const sched::Step &step, Time now, Taker *taker) {
   if (!step.events.empty()) report(locked, step.events);
-  const bool guards = guard_ && tasks_.can_give_way();
+  const bool guards = is_guarded();
   // Wakes the throttling guard before any job: a job above the calling thread may delay everything that follows. The
   // guard is above all jobs and waits for the lock. Its owner is raised meanwhile, and no job preempts it.
   const bool has_jobs = placement_.unfinished() > 0 || !step.dispatches.empty();
@@ -231,10 +236,17 @@ void Engine::decide(Locked &locked, Time now, Taker *taker) {
 
 void Engine::report(Locked &locked, std::span<const JobEvent> events) {
   const bool has_listeners = has_listeners_.load(std::memory_order_relaxed);
+  const trace::Tap *const tap = trace::tap();
   for (const JobEvent &event : events) {
+    if (tap != nullptr) tap->event(this, event);
     if (options_.trace_capacity > 0) decisions_.push(event);
     if (options_.measure && event.kind == JobEventKind::Preempted) ++tasks_[event.task].preemptions;
-    if (!has_listeners || event.kind != JobEventKind::Skipped) continue;
+    if (event.kind != JobEventKind::Skipped) continue;
+    if (options_.misses != nullptr &&
+        options_.misses->note({event.time, 0, event.task, event.job, MissKind::Skipped, event.reason})) {
+      locked.wake_ups().wake_helper(options_.misses->parker());
+    }
+    if (!has_listeners) continue;
     const auto &listener = tasks_[event.task].listener;
     if (listener) locked.tell(listener, event.reason);
   }

@@ -29,6 +29,7 @@
 #include "redag/runtime/executor_options.hpp"
 #include "redag/runtime/job_body.hpp"
 #include "redag/runtime/job_placement.hpp"
+#include "redag/runtime/miss_log.hpp"
 #include "redag/runtime/parker.hpp"
 #include "redag/runtime/release_thread.hpp"
 #include "redag/runtime/setup.hpp"
@@ -58,7 +59,8 @@ struct EngineOptions {
   std::size_t trace_capacity = 0;  // events that the rings hold between two drain(); 0: no events
   ExceptionHandler on_exception;   // empty: exceptions are only counted
   bool start_paused = false;       // as after pause()
-  bool measure = false;            // figures() includes responses, misses and preemptions
+  bool measure = false;            // figures() includes responses and preemptions
+  MissLog *misses = nullptr;       // every miss is noted there; must outlive the engine
   // none, cooperative: how many spins a thread without a job makes before it sleeps; see spins_in().
   std::uint32_t spins = 0;
   std::size_t touched_stack = 0;  // bytes of each worker thread's stack; see ThreadSetup
@@ -88,10 +90,18 @@ struct TaskFigures {
   Usage usage;
   std::uint32_t active = 0;  // jobs that have started and not ended
   std::uint32_t ready = 0;
+  std::uint64_t late = 0;             // finished after the deadline
+  std::uint64_t late_end_to_end = 0;  // of a sink: finished after the DAG's deadline
   // Zero or null unless EngineOptions::measure is set:
-  std::uint64_t late = 0;  // finished after the deadline
   std::uint64_t preemptions = 0;
-  std::shared_ptr<const Histogram> response;  // of finished jobs, from the nominal release
+  std::shared_ptr<const Histogram> response;    // of finished jobs, from the nominal release
+  std::shared_ptr<const Histogram> end_to_end;  // of a sink: from the earliest release whose data it carries
+};
+
+/// The figures of one worker thread for a live view.
+struct ThreadFigures {
+  Duration used = 0;  // processor time of the jobs that ended on it
+  TaskId task;        // of its topmost job; not valid: it has none
 };
 
 struct AddedDag {
@@ -187,6 +197,8 @@ class Engine {
   [[nodiscard]] sched::Accounting accounting(TaskId task) const;
   [[nodiscard]] Usage usage(TaskId task) const;
   [[nodiscard]] TaskFigures figures(TaskId task) const;
+  /// Replaces `out` by the figures of all worker threads, in their order.
+  void figures(std::vector<ThreadFigures> &out) const;
   /// For how long jobs that are not of high criticality were demoted to ordinary threads because of throttling.
   [[nodiscard]] Duration gave_way() const;
   /// How often a job could have had a processor but waited for a thread, because all threads had jobs.
@@ -222,22 +234,35 @@ class Engine {
   void run(Taker &taker, Time &at) noexcept;
   sched::Outcome call(const Assignment &assignment);
   void finish(Taker &taker, RunningJob &running, sched::Outcome outcome, Time &next_begins);
+  void note_misses(Locked &locked, const Job &job, const TaskEntry &entry, Time at, sched::Outcome outcome)
+      REDAG_REQUIRES(lock_);
   void preemption_point(RunningJob &job);
   void reach_limit(RunningJob &job, Duration used);
 
   void report_limits(RunningJob &job, Duration used, Time now) REDAG_REQUIRES(lock_);
   bool tell_limits(RunningJob &job, Duration used, Time now, bool from_outside) REDAG_REQUIRES(lock_);
   void decide(Locked &locked, Time now, Taker *taker = nullptr) REDAG_REQUIRES(lock_);
+  void carry_out(Locked &locked, const sched::Step &step, Time now, Taker *taker) REDAG_REQUIRES(lock_);
   void report(Locked &locked, std::span<const JobEvent> events) REDAG_REQUIRES(lock_);
   Duration look_at_throttling() REDAG_EXCLUDES(lock_);
   void refresh_outranked() REDAG_REQUIRES(lock_);
-  void register_task(TaskId id, const Task &task, DagId dag, Body &body,
+  void register_task(TaskId id, const Task &task, const TaskRole &role, Body &body,
                      std::shared_ptr<SkipListener> listener = nullptr) REDAG_REQUIRES(lock_);
+  void register_dag(DagId id, const Dag &dag, std::span<const TaskId> ids, std::span<Body> bodies)
+      REDAG_REQUIRES(lock_);
   void withdraw_if_halting() REDAG_REQUIRES(lock_) {
     if (halted_at_ == kNever && halting()) withdraw();
   }
   void withdraw() REDAG_REQUIRES(lock_);
   void wake_pause_waiters() REDAG_REQUIRES(lock_);
+  void end_of_jobs() REDAG_REQUIRES(lock_);
+  /// Returns true if the throttling guard sees each decision.
+  [[nodiscard]] bool is_guarded() const REDAG_REQUIRES(lock_) { return guard_ && tasks_.can_give_way(); }
+  /// Returns true if a thread may begin its next job without carry_out(): neither the guard nor preemption points need
+  /// to know of it.
+  [[nodiscard]] bool may_hand_over() const REDAG_REQUIRES(lock_) {
+    return options_.config.preemption != sched::Preemption::Cooperative && !is_guarded();
+  }
   [[nodiscard]] bool may_start() const REDAG_REQUIRES(lock_) { return running_ && !paused_; }
 
   [[nodiscard]] bool os() const { return options_.config.preemption == sched::Preemption::Full; }
@@ -249,7 +274,8 @@ class Engine {
   std::unique_ptr<sched::Scheduler> scheduler_ REDAG_PT_GUARDED_BY(lock_);
   WorkerPool pool_;
   TaskTable tasks_ REDAG_GUARDED_BY(lock_);
-  const std::unique_ptr<HelperThread> lookout_;  // several ordinary threads
+  std::vector<Duration> dag_deadlines_ REDAG_GUARDED_BY(lock_);  // of add_dag(), by DagId
+  const std::unique_ptr<HelperThread> lookout_;                  // several ordinary threads
   JobPlacement placement_ REDAG_GUARDED_BY(lock_);
   std::optional<ThrottlingGuard> guard_ REDAG_GUARDED_BY(lock_);  // os, throttled
   bool running_ REDAG_GUARDED_BY(lock_) = false;                  // the threads have been started

@@ -11,6 +11,9 @@
 #include "redag/runtime/engine_locked.hpp"
 #include "redag/runtime/preemption_point.hpp"
 #include "redag/runtime/running_job.hpp"
+#include "redag/trace/tap.hpp"
+
+// Members that are declared inline here are for run() alone.
 
 namespace redag::runtime {
 
@@ -30,10 +33,16 @@ void Engine::run(Taker &taker, Time &at) noexcept {
   WorkerThread &self = taker.thread;
   const Assignment &assignment = taker.next.assignment;
   const Job &job = assignment.job;
-  if (options_.trace_capacity > 0) {
+  const trace::Tap *const tap = trace::tap();
+  const bool is_traced = options_.trace_capacity > 0;
+  const auto tell = [&](JobEventKind kind, Time time, std::int64_t value) {
+    const JobEvent event{time, value, job.task, job.number, job.worker.value, kind, Reason::None, 0};
+    if (is_traced) self.events.push(event);
+    if (tap != nullptr) tap->event(this, event);
+  };
+  if (is_traced || tap != nullptr) {
     const Time begun = now();
-    self.events.push(
-        JobEvent{begun, begun, job.task, job.number, job.worker.value, JobEventKind::Started, Reason::None, 0});
+    tell(JobEventKind::Started, begun, begun);
   }
   RunningJob running;
   running.engine = this;
@@ -44,7 +53,7 @@ void Engine::run(Taker &taker, Time &at) noexcept {
   running.origin = job.origin;
   running.top = &self.top;
   running.limit = assignment.entry->next_limit(running);
-  running.measured = assignment.entry->always_measured();
+  running.measured = assignment.measured;
   if (self.meter.needs_reading(at, !assignment.expected_short)) {
     self.meter.set(thread_cpu_now(), at);
     at = now();
@@ -55,21 +64,18 @@ void Engine::run(Taker &taker, Time &at) noexcept {
   RunningJob::set_current(&running);
   running.enter();
   const Outcome outcome = call(assignment);
-  running.close();
+  if (running.ended == kNever) running.end();
   RunningJob::set_current(running.below);
   if (running.start.exact && !running.on_trust) {
     self.meter.set(running.start.cpu + running.charged, running.ended);
   } else {
     self.meter.pass();
   }
-  if (options_.trace_capacity > 0) {
-    self.events.push(JobEvent{running.ended, running.charged, job.task, job.number, job.worker.value,
-                              JobEventKind::Executed, Reason::None, 0});
-  }
+  if (is_traced || tap != nullptr) tell(JobEventKind::Executed, running.ended, running.charged);
   finish(taker, running, outcome, at);
 }
 
-Outcome Engine::call(const Assignment &assignment) {
+inline Outcome Engine::call(const Assignment &assignment) {
   try {
     return assignment.entry->body(assignment.job);
   } catch (const BudgetExceeded &) {
@@ -81,36 +87,79 @@ Outcome Engine::call(const Assignment &assignment) {
 }
 
 // Sets `next_begins` to when the thread's next job begins.
-void Engine::finish(Taker &taker, RunningJob &running, Outcome outcome, Time &next_begins) {
+[[gnu::always_inline]] inline void Engine::finish(Taker &taker, RunningJob &running, Outcome outcome,
+                                                  Time &next_begins) {
   Body doomed;  // of a removed task; destroyed without the lock
   TaskEntry &entry = *taker.next.assignment.entry;
   const Time at = running.ended;
-  const bool measured = entry.response && outcome == Outcome::Finished;
-  const Duration response = at - taker.next.assignment.job.release;
-  if (measured) entry.response->add(response);
+  const Job job = taker.next.assignment.job;  // the decision replaces it
+  const bool finished = outcome == Outcome::Finished;
+  const Duration response = at - job.release;
+  const Duration end_to_end = at - job.origin;
+  if (entry.response && finished) {
+    entry.response->add(response);
+    if (entry.end_to_end && entry.end_to_end != entry.response) entry.end_to_end->add(end_to_end);
+  }
   bool delayed = false;
   {
     Locked locked(*this, &delayed);
     withdraw_if_halting();
     entry.count(running.charged, at - running.begun);
-    if (measured && response > entry.deadline) ++entry.late;
+    taker.thread.used += running.charged;
+    const bool late = finished && response > entry.deadline;
+    if (late) ++entry.late;
+    if (finished && end_to_end > entry.dag_deadline) ++entry.late_end_to_end;
+    if (options_.misses != nullptr) note_misses(locked, job, entry, at, outcome);
+    if (const trace::Tap *const tap = trace::tap(); tap != nullptr && late && entry.deadline > 0) {
+      tap->late(this, {at, at, job.task, job.number, job.worker.value, JobEventKind::Finished, Reason::None, 0},
+                response - entry.deadline);
+    }
     --entry.busy;
     if (entry.removed && entry.busy == 0) doomed.swap(entry.body);
-    placement_.end(taker.thread);
     if (running.charged > running.limit) {
       running.used_budget = running.used_budget || outcome == Outcome::BudgetExceeded;
       report_limits(running, running.charged, at);
     }
-    scheduler_->complete(running.slot, at, outcome);
-    decide(locked, at, &taker.thread == &pool_.caller() ? nullptr : &taker);
-    if (placement_.unfinished() == 0 && halted_at_ != kNever) idle_event_.set();
-    if (placement_.unfinished() == 0 && pause_waiters_ > 0) wake_pause_waiters();
+    const sched::Step step = scheduler_->finish(running.slot, at, outcome, may_start() ? sched::kNoLimit : 0);
+    if (may_hand_over() && placement_.hand_over(taker, step, tasks_, locked.waited())) {
+      if (!step.events.empty()) report(locked, step.events);
+    } else {
+      placement_.end(taker.thread);
+      carry_out(locked, step, at, &taker.thread == &pool_.caller() ? nullptr : &taker);
+      if (placement_.unfinished() == 0) end_of_jobs();
+    }
   }
   next_begins = delayed || !running.on_trust ? now() : at;
 }
 
+void Engine::note_misses(Locked &locked, const Job &job, const TaskEntry &entry, Time at, Outcome outcome) {
+  const auto note = [&](MissKind kind, Reason reason, Duration lateness) {
+    if (options_.misses->note({at, lateness, job.task, job.number, kind, reason})) {
+      locked.wake_ups().wake_helper(options_.misses->parker());
+    }
+  };
+  if (outcome == Outcome::NoData) return;
+  if (outcome != Outcome::Finished) return note(MissKind::Aborted, sched::reason_of(outcome), 0);
+  if (const Duration lateness = at - job.release - entry.deadline; lateness > 0) {
+    note(MissKind::Late, Reason::None, lateness);
+  }
+  if (entry.dag_deadline == kNever) return;
+  if (const Duration lateness = at - job.origin - entry.dag_deadline; lateness > 0) {
+    note(MissKind::EndToEnd, Reason::None, lateness);
+  }
+}
+
+// No job is in progress any more.
+void Engine::end_of_jobs() {
+  if (halted_at_ != kNever) idle_event_.set();
+  if (pause_waiters_ > 0) wake_pause_waiters();
+}
+
 void RunningJob::close() noexcept {
-  if (ended != kNever) return;
+  if (ended == kNever) end();
+}
+
+inline void RunningJob::end() noexcept {
   leave();
   ended = engine->now();
   const Duration took = ended - begun;

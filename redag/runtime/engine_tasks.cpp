@@ -2,17 +2,26 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The engine's tasks: adds, changes and removes them while jobs run, and reports their counts.
+#include <algorithm>
+
 #include "redag/base/check.hpp"
 #include "redag/base/lock_guard.hpp"
 #include "redag/runtime/engine.hpp"
 #include "redag/runtime/engine_locked.hpp"
+#include "redag/trace/tap.hpp"
 
 namespace redag::runtime {
 
 void Engine::bind(const Workload &workload, std::vector<Body> bodies) {
   REDAG_CHECK(bodies.size() == workload.task_count(), "every task needs a body");
   Locked locked(*this);
-  for (const TaskRef &ref : flatten(workload)) register_task(ref.id, *ref.task, ref.dag, bodies[ref.id.value]);
+  std::vector<TaskId> ids;
+  for (std::size_t d = 0; d < workload.dags.size(); ++d) {
+    const Dag &dag = workload.dags[d];
+    const std::size_t first = ids.size();
+    for (std::size_t i = 0; i < dag.tasks.size(); ++i) ids.emplace_back(first + i);
+    register_dag(DagId(d), dag, std::span(ids).subspan(first), std::span(bodies).subspan(first, dag.tasks.size()));
+  }
 }
 
 AddedDag Engine::add_dag(const Dag &dag, std::vector<Body> bodies) {
@@ -24,7 +33,9 @@ AddedDag Engine::add_dag(const Dag &dag, std::vector<Body> bodies) {
   added.dag = scheduler_->add_dag(dag, at);
   const std::span<const TaskId> tasks = scheduler_->tasks_of(added.dag);
   added.tasks.assign(tasks.begin(), tasks.end());
-  for (std::size_t i = 0; i < bodies.size(); ++i) register_task(added.tasks[i], dag.tasks[i], added.dag, bodies[i]);
+  register_dag(added.dag, dag, added.tasks, bodies);
+  dag_deadlines_.resize(std::max<std::size_t>(dag_deadlines_.size(), added.dag.value + 1));
+  dag_deadlines_[added.dag.value] = dag.deadline;
   decide(locked, at);
   return added;
 }
@@ -35,7 +46,13 @@ TaskId Engine::add_task(DagId dag, std::uint32_t rank, const Task &task, Body bo
   Locked locked(*this);
   withdraw_if_halting();
   const TaskId id = scheduler_->add_task(dag, rank, task, at);
-  register_task(id, task, dag, body, std::move(listener));
+  // Its jobs can carry older data. Only the caller knows what follows the task.
+  const TaskRole role{.dag = dag,
+                      .is_high = scheduler_->criticality(dag) == Criticality::High,
+                      .is_sink = true,
+                      .has_predecessors = true,
+                      .dag_deadline = dag.value < dag_deadlines_.size() ? dag_deadlines_[dag.value] : 0};
+  register_task(id, task, role, body, std::move(listener));
   decide(locked, at);
   return id;
 }
@@ -70,9 +87,26 @@ void Engine::set_timing(TaskId task, Duration period, Duration deadline) {
   decide(locked, at);
 }
 
-void Engine::register_task(TaskId id, const Task &task, DagId dag, Body &body, std::shared_ptr<SkipListener> listener) {
+void Engine::register_dag(DagId id, const Dag &dag, std::span<const TaskId> ids, std::span<Body> bodies) {
+  std::vector<bool> has_successor(dag.tasks.size());
+  for (const Task &task : dag.tasks) {
+    for (const std::uint32_t predecessor : task.predecessors) has_successor[predecessor] = true;
+  }
+  for (std::size_t i = 0; i < dag.tasks.size(); ++i) {
+    const TaskRole role{.dag = id,
+                        .is_high = dag.criticality == Criticality::High,
+                        .is_sink = !has_successor[i],
+                        .has_predecessors = !dag.tasks[i].predecessors.empty(),
+                        .dag_deadline = dag.deadline};
+    register_task(ids[i], dag.tasks[i], role, bodies[i]);
+  }
+}
+
+void Engine::register_task(TaskId id, const Task &task, const TaskRole &role, Body &body,
+                           std::shared_ptr<SkipListener> listener) {
   if (listener != nullptr) has_listeners_.store(true, std::memory_order_relaxed);
-  tasks_.add(id, task, scheduler_->criticality(dag) == Criticality::High, body, std::move(listener));
+  tasks_.add(id, task, role, body, std::move(listener));
+  if (const trace::Tap *const tap = trace::tap(); tap != nullptr) tap->task(this, id, role.dag, task);
   for (const auto &thread : pool_.threads()) thread->stack.reserve(tasks_.most_started());
 }
 
@@ -91,15 +125,26 @@ Usage Engine::usage(TaskId task) const {
 TaskFigures Engine::figures(TaskId task) const {
   const LockGuard guard(lock_);
   const TaskEntry &entry = tasks_[task];
-  TaskFigures figures{scheduler_->accounting(task),
-                      entry.usage,
-                      entry.busy,
-                      scheduler_->ready(task),
-                      entry.late,
-                      entry.preemptions,
-                      entry.response};
+  TaskFigures figures{.jobs = scheduler_->accounting(task),
+                      .usage = entry.usage,
+                      .active = entry.busy,
+                      .ready = scheduler_->ready(task),
+                      .late = entry.late,
+                      .late_end_to_end = entry.late_end_to_end,
+                      .preemptions = entry.preemptions,
+                      .response = entry.response,
+                      .end_to_end = entry.end_to_end};
   figures.jobs.skipped -= entry.withdrawn;
   return figures;
+}
+
+void Engine::figures(std::vector<ThreadFigures> &out) const {
+  out.clear();
+  out.reserve(pool_.size());  // spares allocations under the lock
+  const LockGuard guard(lock_);
+  for (const auto &thread : pool_.threads()) {
+    out.push_back({thread->used, thread->stack.empty() ? TaskId() : thread->stack.back().task});
+  }
 }
 
 }  // namespace redag::runtime

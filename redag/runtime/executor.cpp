@@ -7,142 +7,24 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <map>
-#include <optional>
-#include <type_traits>
+#include <stdexcept>
 #include <utility>
 
-#include "redag/base/atomic.hpp"
-#include "redag/base/lock_guard.hpp"
-#include "redag/base/mutex.hpp"
-#include "redag/base/pi_mutex.hpp"
-#include "redag/base/text.hpp"
-#include "redag/base/thread_annotations.hpp"
-#include "redag/live/publisher.hpp"
-#include "redag/model/validate.hpp"
 #include "redag/runtime/clock.hpp"
-#include "redag/runtime/dag_mistakes.hpp"
-#include "redag/runtime/engine.hpp"
+#include "redag/runtime/executor_impl.hpp"
 #include "redag/runtime/live_sample.hpp"
-#include "redag/runtime/release_timer.hpp"
-#include "redag/runtime/setup.hpp"
 #include "redag/runtime/spins.hpp"
+#include "redag/runtime/stop_signals.hpp"
 #include "redag/runtime/threads.hpp"
-#include "redag/runtime/watchdog.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 
 namespace redag::runtime {
 namespace {
 
-constexpr Duration kStartMargin = kMillisecond;  // from all threads being ready to the first release
-constexpr std::size_t kMaxTraceCapacity = std::size_t{1} << 28U;
-constexpr double kMaxWatchedDeadlines = 1e6;
-
-[[noreturn]] void refuse(const std::string &what) { throw std::invalid_argument(what); }
-
-template <class Number>
-void check_range(const char *option, Number value, std::type_identity_t<Number> least,
-                 std::type_identity_t<Number> most) {
-  if (value >= least && value <= most) return;
-  refuse(fmt::format("ExecutorOptions::{} must be from {} to {}, not {}", option, least, most, value));
-}
-
-void check_duration(const char *option, nanoseconds value) {
-  if (value.count() >= 0 && value.count() <= kMaxDuration) return;
-  refuse(fmt::format("ExecutorOptions::{} must be from 0s to {}, not {}", option, kMaxDurationText,
-                     format_duration(value.count())));
-}
-
-void check(const ExecutorOptions &options) {
-  if (const std::string why = name_mistake(options.name); !why.empty()) {
-    refuse(fmt::format("ExecutorOptions::name {} {}", in_quotes(options.name), why));
-  }
-  check_range("workers", options.workers, 0U, kMaxWorkers);
-  check_range("threads", options.threads, 0U, 2 * kMaxWorkers);
-  if (options.threads > 0 && options.threads < options.workers) {
-    refuse(fmt::format("ExecutorOptions::threads is {}, but must be 0 or at least {}, the number of workers",
-                       options.threads, options.workers));
-  }
-  check_range("trace_capacity", options.trace_capacity, std::size_t{0}, kMaxTraceCapacity);
-  check_duration("spin", options.spin);
-  check_duration("stop_timeout", options.stop_timeout);
-  if (!options.watchdog) return;
-  const WatchLimits &limits = options.watchdog->limits;
-  check_duration("watchdog: limits.longest", nanoseconds(limits.longest));
-  check_duration("watchdog: interval", nanoseconds(options.watchdog->interval));
-  check_range("watchdog: limits.deadlines", limits.deadlines, 0.0, kMaxWatchedDeadlines);
-  if (limits.longest == 0 && limits.deadlines == 0) {
-    refuse(
-        "ExecutorOptions::watchdog: no job would be overdue (set limits.longest or limits.deadlines to a value greater "
-        "than 0)");
-  }
-}
+constexpr Duration kStartMargin = kMillisecond;                // from all threads being ready to the first release
+constexpr std::size_t kRecordedTrace = std::size_t{1} << 15U;  // events in each ring, for `record`
 
 }  // namespace
-
-class Executor::Impl {
- public:
-  explicit Impl(ExecutorOptions options);
-  ~Impl();
-  Impl(const Impl &) = delete;
-  Impl &operator=(const Impl &) = delete;
-
-  DagId add(Dag dag, std::vector<DagBuilder::Function> functions);
-  void remove(DagId dag);
-  void run_for(nanoseconds duration);
-  void start();
-  void wait();
-  void stop();
-  void request_stop() noexcept;
-  void drain(std::vector<JobEvent> &events);
-  [[nodiscard]] std::vector<TaskStats> stats(DagId dag) const;
-  [[nodiscard]] std::string task_name(TaskId task) const;
-  [[nodiscard]] const Setup &setup() const { return setup_; }
-  [[nodiscard]] const Engine &engine() const { return *engine_; }
-
- private:
-  struct Added {
-    std::string name;
-    std::vector<Task> tasks;
-    std::uint32_t max_active = 0;
-    AddedDag ids;          // the engine's ids
-    std::size_t left = 0;  // how many of the tasks' ids no later task has
-    bool removed = false;
-    Dag dag;  // for `admission` only
-  };
-  struct Owner {
-    DagId dag;  // the executor's id, not the engine's
-    std::uint32_t position = 0;
-    Time since = 0;  // jobs released earlier belong to a former task with this id
-  };
-  void finish();
-  void admit(const Dag &dag) const REDAG_REQUIRES(lock_);
-  void on_overdue(const OverdueJob &job);
-  [[nodiscard]] Result<void> start_threads();
-  [[nodiscard]] Result<void> start_watchdog();
-  void sample(live::Sample &sample) const;
-  void on_exception(const Job &job, std::exception_ptr exception);
-  void own(DagId dag, const std::vector<TaskId> &tasks, Time since) REDAG_REQUIRES(lock_);
-  [[nodiscard]] std::string name_of(const Owner &owner) const REDAG_REQUIRES(lock_);
-
-  ExecutorOptions options_;
-  Setup setup_;
-  std::unique_ptr<Engine> engine_;
-  std::unique_ptr<ReleaseTimer> timer_;
-  std::unique_ptr<Watchdog> watchdog_;  // from start() until no body is left
-  mutable PiMutex lock_;
-  // Without a trace the engine uses ids again. Memory then does not grow with the number of former DAGs.
-  std::map<std::uint32_t, Added> dags_ REDAG_GUARDED_BY(lock_);  // by DagId
-  std::uint32_t next_dag_ REDAG_GUARDED_BY(lock_) = 0;
-  std::vector<Owner> owners_ REDAG_GUARDED_BY(lock_);   // by TaskId
-  std::exception_ptr failure_ REDAG_GUARDED_BY(lock_);  // the first exception that stopped the executor
-  bool running_ REDAG_GUARDED_BY(lock_) = false;
-  Mutex finishing_;  // held by the one thread that begins or ends the run
-  Atomic<bool> started_{false};
-  Atomic<bool> finished_{false};
-  Event stop_;
-  std::unique_ptr<live::Publisher> live_;  // last: asks for figures until it is destroyed
-};
 
 Executor::Impl::Impl(ExecutorOptions options) : options_(std::move(options)) {
   check(options_);
@@ -161,6 +43,23 @@ Executor::Impl::Impl(ExecutorOptions options) : options_(std::move(options)) {
     }
   }
 
+  if (!options_.record.empty()) {
+    Result<std::unique_ptr<Recorder>> recorder = Recorder::create(options_.record, options_.record_bytes);
+    if (!recorder) throw std::runtime_error(to_string(recorder.error()));
+    recorder_ = *std::move(recorder);
+    if (options_.trace_capacity == 0) options_.trace_capacity = kRecordedTrace;
+    if (const std::string &aside = recorder_->moved_aside(); !aside.empty()) {
+      setup_.warnings.push_back(
+          fmt::format("an earlier run did not end normally; its record is in '{}' (restore it with "
+                      "'redag recover {} --out DIR')",
+                      aside, aside));
+    }
+  }
+  if (options_.on_deadline_miss) {
+    misses_ = std::make_unique<MissReporter>(
+        [this](const Miss &miss, std::uint64_t unreported) { on_miss(miss, unreported); });
+  }
+
   EngineOptions engine;
   engine.name = options_.name;
   engine.config = setup_.config;
@@ -169,7 +68,8 @@ Executor::Impl::Impl(ExecutorOptions options) : options_(std::move(options)) {
   engine.throttling = setup_.throttling;
   engine.cpus = options_.cpus;
   engine.trace_capacity = options_.trace_capacity;
-  engine.measure = options_.live;
+  engine.measure = options_.live || options_.measure;
+  if (misses_) engine.misses = &misses_->log();
   engine.spins = spins_before_sleep(setup_, options_.spin.count());
   if (options_.lock_memory) engine.touched_stack = kTouchedStack;
   engine.on_exception = [this](const Job &job, std::exception_ptr e) { on_exception(job, std::move(e)); };
@@ -188,88 +88,15 @@ Executor::Impl::Impl(ExecutorOptions options) : options_(std::move(options)) {
 }
 
 Executor::Impl::~Impl() {
+  disconnect_sources();
   request_stop();
   timer_->join();
   // The watchdog watches until no body runs.
   if (watchdog_) (void)engine_->wait_idle(kNever);
   watchdog_.reset();
   engine_->join();
-}
-
-DagId Executor::Impl::add(Dag dag, std::vector<DagBuilder::Function> functions) {
-  inherit_periods(dag);
-  if (const std::string mistakes = mistakes_of(dag, options_.policy); !mistakes.empty()) {
-    refuse("Executor::add(): " + mistakes);
-  }
-
-  std::vector<Body> bodies;
-  for (DagBuilder::Function &body : functions) {
-    bodies.emplace_back([function = std::move(body)](const Job &) {
-      function();
-      return sched::Outcome::Finished;
-    });
-  }
-  const LockGuard guard(lock_);
-  const auto has_name = [&](const auto &added) { return !added.second.removed && added.second.name == dag.name; };
-  if (std::any_of(dags_.begin(), dags_.end(), has_name)) {
-    refuse("Executor::add(): " + place_of(dag.name) +
-           ": another DAG in the executor has this name (remove() that one first, or choose another name)");
-  }
-  if (options_.admission) admit(dag);
-  const DagId id(next_dag_);
-  Added added{dag.name, dag.tasks, dag.max_active, engine_->add_dag(dag, std::move(bodies)), 0, false, {}};
-  if (options_.admission) added.dag = dag;
-  const Time now = running_ ? std::max<Time>(0, engine_->now()) : 0;
-  own(id, added.ids.tasks, now);
-  added.left = added.ids.tasks.size();
-  timer_->add(dag, added.ids.tasks, now);
-  dags_.emplace(id.value, std::move(added));
-  ++next_dag_;
-  return id;
-}
-
-// Records which task owns each id. A DAG's record is erased once later tasks own all of its ids.
-void Executor::Impl::own(DagId dag, const std::vector<TaskId> &tasks, Time since) {
-  for (std::uint32_t position = 0; position < tasks.size(); ++position) {
-    const std::uint32_t task = tasks[position].value;
-    if (task >= owners_.size()) {
-      owners_.resize(task + 1);
-    } else if (const auto former = dags_.find(owners_[task].dag.value); former != dags_.end()) {
-      if (--former->second.left == 0) dags_.erase(former);
-    }
-    owners_[task] = Owner{dag, position, since};
-  }
-}
-
-void Executor::Impl::admit(const Dag &dag) const {
-  Workload workload;
-  workload.name = options_.name;
-  workload.platform = Platform{options_.workers, setup_.mode.mode};
-  workload.policy = options_.policy;
-  workload.ties = options_.ties;
-  for (const auto &[id, other] : dags_) {
-    if (!other.removed) workload.dags.push_back(other.dag);
-  }
-  workload.dags.push_back(dag);
-  if (const Result<void> admitted = options_.admission(workload, engine_->options().config); !admitted) {
-    throw AdmissionRefused(fmt::format("DAG '{}' is not admitted: {}", dag.name, to_string(admitted.error())));
-  }
-}
-
-void Executor::Impl::remove(DagId dag) {
-  DagId removed;
-  {
-    const LockGuard guard(lock_);
-    if (dag.value >= next_dag_)
-      throw std::out_of_range(fmt::format("Executor::remove(): there is no DAG {}", dag.value));
-    const auto found = dags_.find(dag.value);
-    if (found == dags_.end() || found->second.removed) return;
-    Added &gone = found->second;
-    gone.removed = true;
-    timer_->remove(gone.ids.tasks);
-    removed = gone.ids.dag;
-  }
-  engine_->remove_dag(removed);  // destroys bodies, which may own anything: not under lock_
+  if (misses_) misses_->stop();
+  finish_record();
 }
 
 // ---- the run ----
@@ -292,11 +119,26 @@ void Executor::Impl::start() {
     started_ = false;
     throw std::runtime_error(to_string(ready.error()));
   }
-  const LockGuard guard(lock_);
   const Time origin = monotonic_now() + kStartMargin;
+  // A program that releases jobs itself may begin to do so when start() returns: time 0 is then over.
+  if (begin(origin)) static_cast<void>(stop_.wait_until(origin));
+}
+
+// Returns true if there are tasks that the program releases.
+bool Executor::Impl::begin(Time origin) {
+  const LockGuard guard(lock_);
   engine_->set_origin(origin);
   running_ = true;
+  bool has_events = false;
+  for (const auto &[id, added] : dags_) {
+    for (const auto &source : added.sources) {
+      if (source == nullptr || added.removed) continue;
+      source->open();
+      has_events = true;
+    }
+  }
   timer_->begin(origin, kNever);
+  return has_events;
 }
 
 // The release timer waits for begin(), which comes once all threads exist. If a thread cannot be created, the caller
@@ -305,6 +147,15 @@ Result<void> Executor::Impl::start_threads() {
   const Result<void> timing = timer_->start(ThreadSetup{options_.name + "-timer", setup_.timer_priority(), {}});
   if (!timing) return timing;
   if (const Result<void> watching = start_watchdog(); !watching) return watching;
+  if (misses_) {
+    const Result<void> reporting = misses_->start(ThreadSetup{options_.name + "-misses", setup_.timer_priority(), {}});
+    if (!reporting) return reporting;
+  }
+  if (recorder_) {
+    const Result<void> recording = recorder_->start(
+        *engine_, [this] { return run_info(); }, options_.name);
+    if (!recording) return recording;
+  }
   return engine_->start();
 }
 
@@ -340,9 +191,10 @@ void Executor::Impl::request_stop() noexcept {
 }
 
 void Executor::Impl::wait() {
-  if (engine_->in_body()) {
+  if (is_own_thread()) {
     throw std::logic_error(
-        "Executor::wait(): a body cannot wait for the end of its own executor (call stop() instead)");
+        "Executor::wait(): a body, or on_deadline_miss, cannot wait for the end of its own executor (call stop() "
+        "instead)");
   }
   if (!started_) throw std::logic_error("Executor::wait(): the executor is not started (call start() first)");
   stop_.wait();
@@ -357,8 +209,10 @@ void Executor::Impl::wait() {
 
 void Executor::Impl::stop() {
   request_stop();
-  if (started_ && !engine_->in_body()) finish();
+  if (started_ && !is_own_thread()) finish();
 }
+
+bool Executor::Impl::is_own_thread() const { return engine_->in_body() || (misses_ && misses_->is_this_thread()); }
 
 void Executor::Impl::finish() {
   const LockGuard guard(finishing_);
@@ -372,8 +226,18 @@ void Executor::Impl::finish() {
   }
   watchdog_.reset();
   engine_->join();
+  if (misses_) misses_->stop();
   live_.reset();
+  finish_record();
   finished_ = true;
+}
+
+void Executor::Impl::finish_record() {
+  if (!recorder_) return;
+  const Result<void> written = recorder_->finish(engine_->halted_at());
+  if (written) return;
+  setup_.warnings.push_back("the run is not recorded: " + to_string(written.error()));
+  std::fprintf(stderr, "%s: %s\n", options_.name.c_str(), setup_.warnings.back().c_str());
 }
 
 void Executor::Impl::on_exception(const Job &job, std::exception_ptr exception) {
@@ -381,6 +245,11 @@ void Executor::Impl::on_exception(const Job &job, std::exception_ptr exception) 
     const ExceptionInfo info{task_name(job.task), job.number, exception};
     if (options_.on_exception(info) == OnException::Continue) return;
   }
+  fail(std::move(exception));
+}
+
+// Stops the executor; wait() throws the first such exception.
+void Executor::Impl::fail(std::exception_ptr exception) {
   {
     const LockGuard guard(lock_);
     if (!failure_) failure_ = std::move(exception);
@@ -388,65 +257,64 @@ void Executor::Impl::on_exception(const Job &job, std::exception_ptr exception) 
   request_stop();
 }
 
+void Executor::Impl::on_miss(const Miss &miss, std::uint64_t unreported) {
+  MissInfo info{.task = {},
+                .job = miss.job,
+                .kind = miss.kind,
+                .reason = miss.reason,
+                .lateness = miss.lateness,
+                .unreported = unreported,
+                .text = {}};
+  {
+    // The task may have been removed since then. Its id may be another task's.
+    const LockGuard guard(lock_);
+    const Owner &owner = owners_[miss.task.value];
+    info.task = miss.at < owner.since ? "a removed task" : name_of(owner);
+  }
+  const auto what = [&]() -> std::string {
+    switch (miss.kind) {
+      case MissKind::Late: return fmt::format("finished {} late", humanize_duration(miss.lateness));
+      case MissKind::EndToEnd:
+        return fmt::format("finished {} after the end-to-end deadline of its DAG", humanize_duration(miss.lateness));
+      case MissKind::Skipped: return fmt::format("was skipped ({})", to_string(miss.reason));
+      case MissKind::Aborted: return fmt::format("was aborted ({})", to_string(miss.reason));
+    }
+    return {};
+  };
+  info.text = fmt::format("{} #{} {}", info.task, info.job, what());
+  try {
+    options_.on_deadline_miss(info);
+  } catch (...) {
+    fail(std::current_exception());
+  }
+}
+
 // ---- what can be asked ----
 
-void Executor::Impl::drain(std::vector<JobEvent> &events) { engine_->drain(events, finished_); }
-
-std::vector<TaskStats> Executor::Impl::stats(DagId dag) const {
-  const LockGuard guard(lock_);
-  const auto found = dags_.find(dag.value);
-  if (found == dags_.end()) throw std::out_of_range(fmt::format("Executor::stats(): there is no DAG {}", dag.value));
-  const Added &of = found->second;
-  if (of.left < of.tasks.size()) {
-    throw std::out_of_range(fmt::format("Executor::stats(): DAG {} was removed, and its slot is reused", dag.value));
+void Executor::Impl::drain(std::vector<JobEvent> &events) {
+  if (recorder_) {
+    throw std::logic_error("Executor::drain(): ExecutorOptions::record takes the events (read them from its files)");
   }
-  std::vector<TaskStats> result;
-  for (std::size_t i = 0; i < of.tasks.size(); ++i) {
-    const TaskId task = of.ids.tasks[i];
-    result.push_back(TaskStats{of.name + "." + of.tasks[i].name, engine_->accounting(task), engine_->usage(task)});
-  }
-  return result;
-}
-
-std::string Executor::Impl::task_name(TaskId task) const {
-  const LockGuard guard(lock_);
-  if (task.value >= owners_.size()) return fmt::format("task {}", task.value);
-  return name_of(owners_[task.value]);
-}
-
-std::string Executor::Impl::name_of(const Owner &owner) const {
-  const Added &dag = dags_.at(owner.dag.value);  // exists as long as it owns a task
-  return dag.name + "." + dag.tasks[owner.position].name;
-}
-
-void Executor::Impl::sample(live::Sample &sample) const {
-  const LockGuard guard(lock_);
-  for (const auto &[number, dag] : dags_) {
-    if (dag.removed) continue;
-    sample.dags.push_back({dag.name, dag.max_active});
-    for (std::size_t i = 0; i < dag.tasks.size(); ++i) {
-      const TaskId id = dag.ids.tasks[i];
-      live::TaskSample task;
-      fill(task, engine_->figures(id));
-      task.key = id.value;
-      task.name = dag.tasks[i].name;
-      task.dag = static_cast<std::uint32_t>(sample.dags.size() - 1);
-      task.period = dag.tasks[i].period;
-      task.deadline = dag.tasks[i].deadline;
-      sample.tasks.push_back(std::move(task));
-    }
-  }
+  engine_->drain(events, finished_);
 }
 
 // ---- the interface ----
 
 Executor::Executor(ExecutorOptions options) : impl_(std::make_unique<Impl>(std::move(options))) {}
 Executor::~Executor() = default;
-DagId Executor::add(DagBuilder dag) { return impl_->add(std::move(dag.dag_), std::move(dag.bodies_)); }
+DagId Executor::add(DagBuilder dag) {
+  return impl_->add(std::move(dag.dag_), std::move(dag.bodies_), std::move(dag.sources_));
+}
+bool Executor::release(const EventHandle &event) { return event.source_->release(impl_->engine()); }
 void Executor::remove(DagId dag) { impl_->remove(dag); }
 void Executor::run() {
   impl_->start();
   impl_->wait();
+}
+int Executor::run_until_signal(std::initializer_list<int> signals) {
+  const StopSignals stop_signals(*this, signals);
+  run();
+  return stop_signals.received();
 }
 void Executor::run_for(nanoseconds duration) { impl_->run_for(duration); }
 void Executor::start() { impl_->start(); }
@@ -461,7 +329,8 @@ void Executor::drain(std::vector<JobEvent> &events) { impl_->drain(events); }
 Time Executor::stopped_at() const { return impl_->engine().halted_at(); }
 std::uint64_t Executor::lost_events() const { return impl_->engine().lost_events(); }
 std::uint64_t Executor::thread_waits() const { return impl_->engine().thread_waits(); }
-std::vector<TaskStats> Executor::stats(DagId dag) const { return impl_->stats(dag); }
+std::vector<TaskStats> Executor::stats(DagId dag) const { return impl_->stats(dag).tasks; }
+DagStats Executor::dag_stats(DagId dag) const { return impl_->stats(dag); }
 std::string Executor::task_name(TaskId task) const { return impl_->task_name(task); }
 
 }  // namespace redag::runtime

@@ -8,7 +8,9 @@
 // also be called from a signal handler.
 #pragma once
 
+#include <csignal>
 #include <cstdint>
+#include <initializer_list>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -18,6 +20,7 @@
 #include "redag/model/job_event.hpp"
 #include "redag/runtime/dag_builder.hpp"
 #include "redag/runtime/executor_options.hpp"
+#include "redag/runtime/stats.hpp"
 #include "redag/sched/config.hpp"
 
 namespace redag::runtime {
@@ -29,7 +32,7 @@ struct AdmissionRefused : std::runtime_error {
 class Executor {
  public:
   /// Throws std::invalid_argument for an option out of its range. Throws std::runtime_error if preemption `os` is asked
-  /// for and not available; its text says how to get it.
+  /// for and not available, or if the folder of `record` cannot be written; its text says how to mend it.
   explicit Executor(ExecutorOptions options = {});
   /// Stops, and waits for the running bodies without a limit.
   ~Executor();
@@ -44,10 +47,22 @@ class Executor {
   /// second call does nothing. Throws std::out_of_range if there has been no such DAG.
   void remove(DagId dag);
 
+  /// Releases a job of a task that DagBuilder::event() added, now. All rules for releases hold: overrun, max_pending,
+  /// max_active, HI mode. Returns false if no job is released, because the minimum inter-arrival time has not passed
+  /// (EarlyRelease::Skip), or the executor is not running. Throws std::logic_error if this executor does not have the
+  /// task. Takes the engine's lock and wakes threads; allocates nothing. From any thread and any body, but not from a
+  /// signal handler.
+  bool release(const EventHandle &event);
+
   /// Calls start() and wait(), and throws what they throw.
   void run();
   /// As run(), for at most `duration`. Throws std::invalid_argument if `duration` is negative.
   void run_for(nanoseconds duration);
+  /// As run(), and stops at the first of these signals. Returns its number, or 0 if something else stopped the
+  /// executor. A second signal, more than 0.2 s later, has its default effect: it ends the process. A signal that the
+  /// process ignores stays ignored. The previous handlers are back when it returns or throws. Throws std::logic_error
+  /// if another executor of the process is in this function.
+  int run_until_signal(std::initializer_list<int> signals = {SIGINT, SIGTERM});
 
   /// Returns when all threads are ready. Throws std::runtime_error if the system refuses a thread, and can then be
   /// called again. Throws std::logic_error if the executor has already been started.
@@ -68,7 +83,8 @@ class Executor {
   /// The scheduler's configuration. With the events it is all that a trace needs.
   [[nodiscard]] const sched::Config &config() const;
 
-  /// Appends the events since the last call. Times count from the start. For one thread at a time.
+  /// Appends the events since the last call. Times count from the start. For one thread at a time. Throws
+  /// std::logic_error with ExecutorOptions::record, which takes the events.
   void drain(std::vector<JobEvent> &events);
   /// When the scheduler stopped deciding, on the clock of the events; kNever before. A trace ends there, because later
   /// events of started jobs follow no rules.
@@ -79,6 +95,8 @@ class Executor {
   [[nodiscard]] std::uint64_t thread_waits() const;
   /// Also for a removed DAG until its slot is reused (never when tracing). Throws std::out_of_range otherwise.
   [[nodiscard]] std::vector<TaskStats> stats(DagId dag) const;
+  /// The same, and the DAG's answers end to end.
+  [[nodiscard]] DagStats dag_stats(DagId dag) const;
   /// For example "control.ekf". Also for a removed task until its id is used again, which is not before its last job
   /// ends.
   [[nodiscard]] std::string task_name(TaskId task) const;

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The options of an Executor, the values that it passes to callbacks, and its counts. Plain values.
+// The options of an Executor, and the values that it passes to callbacks. Plain values.
 #pragma once
 
 #include <chrono>
@@ -15,6 +15,7 @@
 #include "redag/base/result.hpp"
 #include "redag/base/time.hpp"
 #include "redag/model/workload.hpp"
+#include "redag/runtime/stats.hpp"
 #include "redag/sched/config.hpp"
 
 namespace redag::runtime {
@@ -73,8 +74,19 @@ struct ExecutorOptions {
   std::vector<int> cpus{};         // processors for the workers; empty: os takes `workers` of the usable ones
   nanoseconds spin{};              // none, cooperative: how long a worker spins before it sleeps
   bool lock_memory = false;        // if refused, warnings() says so
-  std::size_t trace_capacity = 0;  // events kept between two drain(); 0: none are recorded
+  std::size_t trace_capacity = 0;  // events kept between two drain(); 0: none, or with `record` 32,768
   bool live = false;               // for `redag top`: a page of shared memory, and a thread that updates it
+  bool measure = false;            // stats() has distributions of responses, and end to end
+  /// Called for every deadline miss, on a thread of its own with the priority of the release timer: above all jobs,
+  /// and without any lock. It may call every member of the Executor except wait(); stop() only requests the stop. While
+  /// it runs, up to 1,024 further misses wait, and more are only counted. An exception stops the executor as that of a
+  /// body does, and wait() throws it. Empty: no such thread.
+  std::function<void(const MissInfo &)> on_deadline_miss{};
+  /// Folder where the run is recorded, for `redag report`, `check-trace`, `why` and `diff`; empty: none. Created if it
+  /// is missing. A thread of normal priority writes events to DIR/flight while the run lasts. At the end they become
+  /// DIR/events.jsonl, which replaces that of an earlier run. After a crash, `redag recover DIR` does this.
+  std::string record{};
+  std::uint64_t record_bytes = std::uint64_t{256} << 20U;  // of events on disk; then the newest replace the oldest
   /// Starts a thread that reports bodies which do not return, also while the executor stops. With it, `on_budget`
   /// (except abort) needs no preemption points. Empty: no such thread.
   std::optional<WatchdogOptions> watchdog{};
@@ -84,22 +96,6 @@ struct ExecutorOptions {
   nanoseconds stop_timeout = std::chrono::seconds(10);  // how long stopping waits for bodies to return
   // Called on the worker's thread; must not throw. Empty: OnException::Stop.
   std::function<OnException(const ExceptionInfo &)> on_exception{};
-};
-
-/// Processor time of the ended jobs of a task.
-struct Usage {
-  std::uint64_t jobs = 0;
-  Duration total = 0;
-  Duration longest = 0;
-  std::uint64_t over_wcet = 0;
-  std::uint64_t over_budget = 0;
-  std::uint64_t overdue = 0;  // jobs that watch() reported
-};
-
-struct TaskStats {
-  std::string task;  // "control.ekf"
-  sched::Accounting jobs;
-  Usage usage;
 };
 
 }  // namespace redag::runtime

@@ -14,18 +14,13 @@
 
 #include "redag/runtime/parker.hpp"
 #include "redag/runtime/preemption_point.hpp"
+#include "redag_testing/one_worker.hpp"
 
 namespace redag::runtime {
 namespace {
 
 using namespace std::chrono_literals;
-
-ExecutorOptions one_worker(PreemptionMode mode = PreemptionMode::None) {
-  ExecutorOptions options;
-  options.workers = 1;
-  options.preemption = mode;
-  return options;
-}
+using testing::one_worker;
 
 TEST(Executor, RunsAChainUntilABodyStopsIt) {
   Executor executor(one_worker());

@@ -124,23 +124,6 @@ void JobPlacement::move_job(WorkerThread &from, WorkerThread &to, bool may_lead,
   add_idle(from, may_lead);
 }
 
-void JobPlacement::assign(WorkerThread &thread, const Dispatch &dispatch, TaskEntry &entry, Assignment &assignment) {
-  REDAG_CHECK(entry.busy < entry.concurrency, "more jobs of one task at a time than it allows");
-  ++entry.busy;
-  ++unfinished_;
-  assignment.job = {.task = dispatch.task,
-                    .number = dispatch.number,
-                    .release = dispatch.release,
-                    .origin = dispatch.origin,
-                    .slot = dispatch.job,
-                    .worker = dispatch.worker};
-  assignment.entry = &entry;
-  assignment.expected_short = entry.expected_short();
-  thread.stack.push_back(assignment.job);
-  thread.level = dispatch.level;
-  thread.is_spared = dispatch.inherits || entry.is_high;
-}
-
 void JobPlacement::change_level(const Dispatch &dispatch, const TaskTable &tasks) {
   const auto runs_it = [&](const WorkerThread &t) { return !t.stack.empty() && t.stack.back().slot == dispatch.job; };
   if (runs_it(pool_.caller())) return;  // runs at its own priority
@@ -152,11 +135,13 @@ void JobPlacement::change_level(const Dispatch &dispatch, const TaskTable &tasks
   apply(priorities_.change((*thread)->index, priority_of(**thread)));
 }
 
+// The job of a thread is followed by this one.
+void JobPlacement::move_priority(WorkerThread &thread, const Assignment &assignment) {
+  apply(priorities_.follow(thread.index, priority_of(thread), keeps_priority(thread, assignment)));
+}
+
 void JobPlacement::set_priority_for_job(WorkerThread &thread, const Assignment &assignment) {
-  if (!os_) return;
-  // A demoted thread must not keep the priority of its previous job.
-  const bool is_short = assignment.expected_short && !gives_way(thread);
-  apply(priorities_.start(thread.index, priority_of(thread), is_short));
+  if (os_) apply(priorities_.start(thread.index, priority_of(thread), keeps_priority(thread, assignment)));
 }
 
 void JobPlacement::apply(std::span<const ThreadPriorities::Change> changes) {

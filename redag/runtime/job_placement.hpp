@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "redag/base/check.hpp"
 #include "redag/runtime/mailboxes.hpp"
 #include "redag/runtime/setup.hpp"
 #include "redag/runtime/task_table.hpp"
@@ -53,6 +54,25 @@ class JobPlacement {
 
   /// Carries out a step. `taker` is the calling thread, or null if it cannot take a job.
   void place(const sched::Step &step, const Situation &situation, Taker *taker, TaskTable &tasks, WakeUps &wake_ups);
+  /// Tries to carry out a step that a thread took at the end of its job, in less time than end() and place() take. This
+  /// is for the usual case: one job starts, and the thread begins it. `waited`: it waited for the engine's lock.
+  /// Returns false in all other cases, in which end() and place() are to be called.
+  bool hand_over(Taker &taker, const sched::Step &step, TaskTable &tasks, bool waited) {
+    if (step.dispatches.size() != 1 || taker.below.valid() || &taker.thread == &pool_.caller()) return false;
+    const sched::Dispatch &next = step.dispatches.front();
+    // With `os` a thread that has a job of its own steals none.
+    if (next.kind != sched::DispatchKind::Start || !(os_ || mailboxes_.all_empty())) return false;
+    WorkerThread &self = taker.thread;
+    TaskEntry &entry = tasks[next.task];
+    mailboxes_.end(self);
+    if (mailboxes_.should_leave(entry, waited)) return false;
+    self.stack.pop_back();
+    --unfinished_;
+    assign(self, next, entry, taker.next.assignment);
+    if (os_) move_priority(self, taker.next.assignment);
+    mailboxes_.begin(self, entry);
+    return true;
+  }
   /// The thread's topmost job has ended.
   void end(WorkerThread &thread);
 
@@ -77,9 +97,30 @@ class JobPlacement {
   void add_idle(WorkerThread &thread, bool may_lead);
   // `assignment`, which these fill, is the thread's mail or its next action.
   void move_job(WorkerThread &from, WorkerThread &to, bool may_lead, Assignment &assignment);
-  void assign(WorkerThread &thread, const sched::Dispatch &dispatch, TaskEntry &entry, Assignment &assignment);
+  void assign(WorkerThread &thread, const sched::Dispatch &dispatch, TaskEntry &entry, Assignment &assignment) {
+    REDAG_CHECK(entry.busy < entry.concurrency, "more jobs of one task at a time than it allows");
+    ++entry.busy;
+    ++unfinished_;
+    assignment.job = {.task = dispatch.task,
+                      .number = dispatch.number,
+                      .release = dispatch.release,
+                      .origin = dispatch.origin,
+                      .slot = dispatch.job,
+                      .worker = dispatch.worker};
+    assignment.entry = &entry;
+    assignment.measured = entry.always_measured();
+    assignment.expected_short = entry.expected_short();
+    thread.stack.push_back(assignment.job);
+    thread.level = dispatch.level;
+    thread.is_spared = dispatch.inherits || entry.is_high;
+  }
   void change_level(const sched::Dispatch &dispatch, const TaskTable &tasks);
   void set_priority_for_job(WorkerThread &thread, const Assignment &assignment);
+  void move_priority(WorkerThread &thread, const Assignment &assignment);
+  /// A thread with a short job may keep a higher priority from its previous one, but not a demoted thread.
+  [[nodiscard]] bool keeps_priority(const WorkerThread &thread, const Assignment &assignment) const {
+    return assignment.expected_short && !gives_way(thread);
+  }
   void apply(std::span<const ThreadPriorities::Change> changes);
   /// Returns true if the thread's job is demoted to an ordinary thread, because real-time threads are throttled.
   [[nodiscard]] bool gives_way(const WorkerThread &thread) const { return giving_way_ && !thread.is_spared; }

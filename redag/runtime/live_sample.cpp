@@ -21,6 +21,18 @@ void fill(live::TaskSample &sample, const TaskFigures &figures) {
   const std::uint64_t in_flight = jobs.in_flight();
   sample.waiting = static_cast<std::uint32_t>(in_flight > started_or_ready ? in_flight - started_or_ready : 0);
   sample.response = figures.response;
+  sample.end_to_end = figures.end_to_end;
+  sample.late_end_to_end = figures.late_end_to_end;
+}
+
+void add_threads(live::Sample &sample, const Engine &engine, std::span<const TaskId> ids) {
+  std::vector<ThreadFigures> threads;
+  engine.figures(threads);
+  for (const ThreadFigures &thread : threads) {
+    live::ThreadSample &added = sample.threads.emplace_back();
+    added.used = thread.used;
+    if (thread.task.valid()) added.task = ids.empty() ? thread.task.value : ids[thread.task.value].value;
+  }
 }
 
 live::PublisherOptions live_options(const std::string &name, const std::string &driver, const Mode &mode,

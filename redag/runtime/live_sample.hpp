@@ -4,6 +4,8 @@
 // Converts the engine's figures for the live page. Pure functions.
 #pragma once
 
+#include <span>
+
 #include "redag/live/publisher.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/runtime/engine.hpp"
@@ -13,6 +15,9 @@ namespace redag::runtime {
 
 /// Sets counters and response times of `sample`. The task's description (key, name, DAG, timing) is left as it is.
 void fill(live::TaskSample &sample, const TaskFigures &figures);
+
+/// Appends the threads of `engine`. A task's key is its id, or that of `ids` at its id's place.
+void add_threads(live::Sample &sample, const Engine &engine, std::span<const TaskId> ids = {});
 
 [[nodiscard]] live::PublisherOptions live_options(const std::string &name, const std::string &driver, const Mode &mode,
                                                   const sched::Config &config);

@@ -93,6 +93,9 @@ class Mailboxes {
   /// wake its thread. Returns that thread, which then finds no mail and is not idle yet, or null.
   WorkerThread *steal(std::uint32_t level) { return handed_.empty() ? nullptr : steal_mail(level); }
 
+  /// Returns true if no thread has mail.
+  [[nodiscard]] bool all_empty() const { return handed_.empty(); }
+
   /// The thread begins a job, and looks for mail when that has ended.
   void begin(WorkerThread &thread, const TaskEntry &entry) {
     if (lookout_ == nullptr || !entry.expected_tiny()) return;

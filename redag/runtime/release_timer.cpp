@@ -21,10 +21,12 @@ ReleaseTimer::ReleaseTimer(Sink sink, std::uint64_t seed)
   due_.reserve(kBatch);
 }
 
-void ReleaseTimer::add(const Dag &dag, std::span<const TaskId> tasks, Time base) {
+void ReleaseTimer::add(const Dag &dag, std::span<const TaskId> tasks, Time base, const std::vector<bool> &is_event) {
   {
     const LockGuard guard(lock_);
-    for (std::size_t i = 0; i < dag.tasks.size(); ++i) heap_.add(dag.tasks[i], tasks[i], base);
+    for (std::size_t i = 0; i < dag.tasks.size(); ++i) {
+      if (is_event.empty() || !is_event[i]) heap_.add(dag.tasks[i], tasks[i], base);
+    }
   }
   thread_.changed();
 }

@@ -26,8 +26,9 @@ class ReleaseTimer {
 
   ReleaseTimer(Sink sink, std::uint64_t seed);
 
-  /// `base` is relative to the `origin` of start(). Call it before or after start().
-  void add(const Dag &dag, std::span<const TaskId> tasks, Time base);
+  /// `base` is relative to the `origin` of start(). Call it before or after start(). `is_event`: by task, whether
+  /// others release it; empty: no task.
+  void add(const Dag &dag, std::span<const TaskId> tasks, Time base, const std::vector<bool> &is_event = {});
   /// When it returns, no release of these tasks is under way or will be reported. Their ids are free.
   void remove(std::span<const TaskId> tasks);
 

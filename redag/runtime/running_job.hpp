@@ -53,6 +53,8 @@ struct RunningJob {
   /// engine does. Later calls have no effect. A job that is over within CpuMeter::kShort is charged this time on trust:
   /// asking for its processor time would be a system call.
   void close() noexcept;
+  /// As close(), for a job that has not been closed.
+  void end() noexcept;
 
   /// watch() may read what the job has used between enter() and leave() only.
   void enter() noexcept { top->store(this, std::memory_order_release); }

@@ -9,7 +9,8 @@
 
 namespace redag::runtime {
 
-void TaskTable::add(TaskId id, const Task &task, bool is_high, Body &body, std::shared_ptr<SkipListener> listener) {
+void TaskTable::add(TaskId id, const Task &task, const TaskRole &role, Body &body,
+                    std::shared_ptr<SkipListener> listener) {
   REDAG_CHECK(id.value <= entries_.size(), "the scheduler numbers tasks differently");
   if (id.value == entries_.size()) entries_.push_back(std::make_unique<TaskEntry>());
   TaskEntry &entry = *entries_[id.value];
@@ -23,10 +24,14 @@ void TaskTable::add(TaskId id, const Task &task, bool is_high, Body &body, std::
   entry.wcet_low = task.wcet_low;
   entry.budget = task.budget;
   entry.cuts_off = task.on_budget == OnBudget::Abort;
-  entry.is_high = is_high;
-  ++(is_high ? high_ : others_);
+  entry.is_high = role.is_high;
+  ++(role.is_high ? high_ : others_);
   entry.deadline = task.deadline;
+  if (role.is_sink && role.dag_deadline > 0) entry.dag_deadline = role.dag_deadline;
   if (measure_) entry.response = std::make_shared<Histogram>();
+  if (measure_ && role.is_sink) {
+    entry.end_to_end = role.has_predecessors ? std::make_shared<Histogram>() : entry.response;
+  }
   entry.concurrency = task.concurrency;
 }
 

@@ -17,6 +17,15 @@
 
 namespace redag::runtime {
 
+/// What a task is within its DAG.
+struct TaskRole {
+  DagId dag;
+  bool is_high = false;           // of a DAG of high criticality
+  bool is_sink = false;           // the DAG answers with its finish
+  bool has_predecessors = false;  // its jobs can carry data of earlier releases
+  Duration dag_deadline = 0;      // end to end; 0: none
+};
+
 /// What the engine keeps of a task: its body, its limits, and what its jobs used.
 struct TaskEntry {
   static constexpr std::uint32_t kStreak = 8;
@@ -49,7 +58,7 @@ struct TaskEntry {
     return wcet_low > 0 || budget > 0 || (wcet > 0 && wcet < CpuMeter::kShort);
   }
   /// Returns true if its last jobs were short: the next one is expected to be short, too.
-  [[nodiscard]] bool expected_short() const { return short_jobs == kStreak && !always_measured(); }
+  [[nodiscard]] bool expected_short() const { return !always_measured() && short_jobs == kStreak; }
   /// Returns true if more than a quarter of its last jobs were tiny: where threads compete for the engine's lock, tiny
   /// jobs that release others often take longer.
   [[nodiscard]] bool expected_tiny() const { return tiny_score > kMostTinyScore / 3; }
@@ -70,8 +79,12 @@ struct TaskEntry {
   bool is_high = false;   // of a DAG of high criticality
   Usage usage;
   Duration deadline = 0;
+  Duration dag_deadline = kNever;       // of a sink; kNever: none
   std::shared_ptr<Histogram> response;  // null: not measured
-  std::uint64_t late = 0;
+  std::shared_ptr<Histogram>
+      end_to_end;                     // of a sink; null: not measured. `response` itself if nothing precedes the task
+  std::uint64_t late = 0;             // finished after the deadline
+  std::uint64_t late_end_to_end = 0;  // finished after the DAG's deadline
   std::uint64_t preemptions = 0;
   std::uint64_t withdrawn = 0;    // jobs skipped by halt()
   std::uint32_t concurrency = 0;  // jobs that can be in progress at once
@@ -83,12 +96,12 @@ struct TaskEntry {
 
 class TaskTable {
  public:
-  /// measure: entries have a histogram of responses.
+  /// measure: entries have histograms of responses.
   explicit TaskTable(bool measure) : measure_(measure) {}
 
   /// Adds a task and takes its body. A reused id starts with a new entry: its former body was destroyed when its last
   /// job ended. `listener` can be null.
-  void add(TaskId id, const Task &task, bool is_high, Body &body, std::shared_ptr<SkipListener> listener);
+  void add(TaskId id, const Task &task, const TaskRole &role, Body &body, std::shared_ptr<SkipListener> listener);
   /// Moves the body to `doomed` unless a job is in progress: destructors are the user's code, to be run without the
   /// lock.
   void remove(TaskId id, std::vector<Body> &doomed);

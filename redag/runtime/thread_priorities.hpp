@@ -6,7 +6,9 @@
 // while that makes no difference among these threads. A value without threads of its own. Not thread-safe.
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -25,13 +27,15 @@ class ThreadPriorities {
   /// While at most this many jobs are started, each has a processor and their order does not matter.
   void set_processors(std::size_t processors) { processors_ = processors; }
 
-  // start(), change() and wait() return the required changes, valid until the next call. Nothing allocates.
+  // start(), change(), follow() and wait() return the required changes, valid until the next call. Nothing allocates.
 
   /// A thread without a job gets one of this priority.
   std::span<const Change> start(std::size_t thread, int priority, bool is_short);
   /// The thread's job gets another priority.
   std::span<const Change> change(std::size_t thread, int priority);
   void end(std::size_t thread);
+  /// As end() and start(): the job of a thread is followed by another one.
+  std::span<const Change> follow(std::size_t thread, int priority, bool is_short);
   /// A thread without a job waits with this priority. Its next job, if short, does not keep it.
   std::span<const Change> wait(std::size_t thread, int priority);
 
@@ -43,13 +47,53 @@ class ThreadPriorities {
     int priority = 0;
     int of_job = 0;  // <= priority while started
     bool started = false;
-    bool waited = false;  // it has its priority from wait()
+    bool waited = false;      // it has its priority from wait()
+    std::uint32_t place = 0;  // in raised_, if it is there
+  };
+  /// Counts threads by their priority. Tells in constant time whether some lie in a range.
+  class Counts {
+   public:
+    void add(int priority) {
+      if (counts_[index(priority)]++ == 0) mask_[index(priority) / 64] |= bit(priority);
+    }
+    void remove(int priority) {
+      if (--counts_[index(priority)] == 0) mask_[index(priority) / 64] &= ~bit(priority);
+    }
+    /// Requires 0 <= least <= most.
+    [[nodiscard]] bool any(int least, int most) const {
+      const std::size_t first = index(least) / 64;
+      const std::size_t last = index(most) / 64;
+      const std::uint64_t from_least = ~std::uint64_t{0} << (index(least) % 64);
+      const std::uint64_t to_most = ~std::uint64_t{0} >> (63 - index(most) % 64);
+      if (first == last) return (mask_[first] & from_least & to_most) != 0;
+      return (mask_[first] & from_least) != 0 || (mask_[last] & to_most) != 0;
+    }
+
+   private:
+    static constexpr std::size_t kPriorities = 128;  // SCHED_FIFO has 1 to 99
+    [[nodiscard]] static std::size_t index(int priority) { return static_cast<std::size_t>(priority); }
+    [[nodiscard]] static std::uint64_t bit(int priority) { return std::uint64_t{1} << (index(priority) % 64); }
+
+    std::array<std::uint32_t, kPriorities> counts_{};
+    std::array<std::uint64_t, kPriorities / 64> mask_{};  // two words: any() knows
   };
 
   std::span<const Change> place(Thread &self, int priority, bool is_short);
+  [[nodiscard]] bool may_keep(const Thread &self, bool all_run);
+  [[nodiscard]] bool overlaps_any(const Thread &self) const;
+  [[nodiscard]] static bool overlaps(const Thread &a, const Thread &b) {
+    return a.of_job <= b.priority && b.of_job <= a.priority;
+  }
+  template <class Predicate>
+  void lower_raised(Predicate which);
+  void enter(Thread &thread);
+  void leave(const Thread &thread);
   void set(Thread &thread);
 
   std::vector<Thread> threads_;
+  // The started threads: those with the priority of their job, and those that keep a higher one.
+  Counts exact_;
+  std::vector<Thread *> raised_;
   std::vector<Change> changes_;
   std::size_t processors_ = 0;
   std::size_t started_ = 0;

@@ -25,6 +25,7 @@ namespace redag::runtime {
 struct Assignment {
   Job job;
   TaskEntry *entry = nullptr;  // keeps its address; its body is not touched while `busy`
+  bool measured = false;       // its processor time is asked for, however short it was
   bool expected_short = false;
 };
 
@@ -51,6 +52,7 @@ struct alignas(64) WorkerThread {
   // lock: a number if its mail did not wake it, and 0 otherwise. Larger numbers are later.
   std::uint64_t silent = 0;
   std::uint32_t level = 0;        // lock: of the job that it was given last; inherited only with `os`
+  Duration used = 0;              // lock: processor time of the jobs that ended here
   bool is_realtime = false;       // lock, throttled: had a job at real-time priority at the last look
   bool is_spared = false;         // lock: its job does not give way to throttling
   Atomic<bool> outranked{false};  // written under the lock

@@ -1,44 +1,102 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// events.jsonl, the lossless form of a trace: a line for the run, a line for each event, and a last line that proves
-// that no line is missing. See docs/results_format.md. Not thread-safe.
+// Files of events, the lossless form of a trace: events.redag (compressed blocks) and events.jsonl (a line for each
+// event). Both describe the run first, and end with a proof that nothing is missing. Readers know a file's form by its
+// first bytes. Neither side holds more than one block of events. See docs/results_format.md. Not thread-safe.
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <span>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "redag/base/result.hpp"
-#include "redag/trace/output_file.hpp"
 #include "redag/trace/trace.hpp"
 
 namespace redag::trace {
 
+class EventsSink;
+class EventsSource;
+
+/// The names of the files in a folder of results.
+inline constexpr std::string_view kEventsFile = "events.redag";
+inline constexpr std::string_view kEventsTextFile = "events.jsonl";
+
 /// Writes events as they arrive, for runs that are too long to be kept in memory.
 class EventsWriter {
  public:
-  /// `info.end` and `info.lost_events` may still be unknown. Errors: an invalid workload, an unwritable place.
+  /// A path that ends in ".redag" gets blocks, any other one text. `info.end` and `info.lost_events` may still be
+  /// unknown. Errors: an invalid workload, an unwritable place.
   [[nodiscard]] static Result<EventsWriter> create(const std::string &path, const RunInfo &info);
 
+  EventsWriter(EventsWriter &&) noexcept;
+  EventsWriter &operator=(EventsWriter &&) = delete;
+  EventsWriter(const EventsWriter &) = delete;
+  EventsWriter &operator=(const EventsWriter &) = delete;
+  ~EventsWriter();
+
+  /// Requires events of the run that `info` described.
   void add(std::span<const JobEvent> events);
 
   /// Completes the file. Until then it does not exist.
   [[nodiscard]] Result<void> commit(Time end, std::uint64_t lost_events);
 
  private:
-  explicit EventsWriter(OutputFile file) : file_(std::move(file)) {}
-
-  OutputFile file_;
-  std::uint64_t count_ = 0;
+  explicit EventsWriter(std::unique_ptr<EventsSink> sink);
+  std::unique_ptr<EventsSink> sink_;
 };
+
+/// Reads a file of either form, some events at a time.
+class EventsReader {
+ public:
+  /// Reads the description of the run. Errors name file and line, or file and byte. A file without its end (an
+  /// incomplete copy) is an error.
+  [[nodiscard]] static Result<EventsReader> open(const std::string &path);
+  /// The same for bytes in memory, which must outlive the reader; `file` is their name in errors.
+  [[nodiscard]] static Result<EventsReader> of(std::string_view bytes, const std::string &file);
+
+  EventsReader(EventsReader &&) noexcept;
+  EventsReader &operator=(EventsReader &&) = delete;
+  EventsReader(const EventsReader &) = delete;
+  EventsReader &operator=(const EventsReader &) = delete;
+  ~EventsReader();
+
+  /// Complete, with the end of the run.
+  [[nodiscard]] const RunInfo &info() const;
+  /// How many events the file says it has.
+  [[nodiscard]] std::uint64_t events() const;
+
+  /// Replaces `events` by the next ones. Returns false after the last one. Errors: as open(), and an event that is none
+  /// of the run.
+  [[nodiscard]] Result<bool> next(std::vector<JobEvent> &events);
+  /// Passes all further events to `visit`, some at a time.
+  [[nodiscard]] Result<void> visit(const std::function<void(std::span<const JobEvent>)> &visit);
+
+ private:
+  explicit EventsReader(std::unique_ptr<EventsSource> source);
+  [[nodiscard]] static Result<EventsReader> make(Result<std::unique_ptr<EventsSource>> source);
+
+  std::unique_ptr<EventsSource> source_;
+};
+
+/// The most events of a trace in memory, at 32 bytes each. EventsReader reads longer files.
+inline constexpr std::uint64_t kMostEventsInMemory = std::uint64_t{1} << 28U;
 
 [[nodiscard]] Result<void> write_trace(const std::string &path, const Trace &trace);
 
-/// Reads a trace. Errors name file and line. A file without its last line (an incomplete copy) is an error.
+/// Reads a whole trace. Errors: those of EventsReader, more than kMostEventsInMemory events.
 [[nodiscard]] Result<Trace> read_trace(const std::string &path);
 
-/// The same for text in memory; `file` is its name in errors.
-[[nodiscard]] Result<Trace> parse_trace(std::string_view text, const std::string &file);
+/// The same for bytes in memory; `file` is their name in errors.
+[[nodiscard]] Result<Trace> parse_trace(std::string_view bytes, const std::string &file);
+
+/// The lines of events.jsonl: the first one, one for each event, the last one.
+[[nodiscard]] std::string events_header(const RunInfo &info);
+void append_event_line(const JobEvent &event, std::string &out);
+[[nodiscard]] std::string events_footer(std::uint64_t events, Time end, std::uint64_t lost_events);
 
 }  // namespace redag::trace

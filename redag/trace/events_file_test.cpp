@@ -10,6 +10,7 @@
 #include <filesystem>
 
 #include "redag/base/rng.hpp"
+#include "redag/trace/output_file.hpp"
 #include "redag/trace/run_info_json.hpp"
 #include "redag_testing/builders.hpp"
 

@@ -344,7 +344,7 @@ std::optional<JobEvent> read_event(JobEvent event, const Description &run, std::
 
 }  // namespace
 
-Result<Recovered> recover(const std::string &folder) {
+Result<Recovered> recover(const std::string &folder, Time end_of_run) {
   Result<Description> run = read_info(folder);
   if (!run) return tl::unexpected<Diagnostics>(std::move(run.error()));
   Recovered found;
@@ -372,8 +372,10 @@ Result<Recovered> recover(const std::string &folder) {
       events.push_back(*event);
     }
   }
-  // The last instant may be incomplete.
-  if (!events.empty()) {
+  if (end_of_run != kNever) {
+    found.trace.info.end = end_of_run;
+  } else if (!events.empty()) {
+    // The last instant may be incomplete.
     const Time end = events.back().time;
     found.trace.info.end = end;
     std::erase_if(events, [end](const JobEvent &event) { return event.time == end; });
@@ -387,6 +389,18 @@ Result<Recovered> recover(const std::string &folder) {
 bool has_flight_record(const std::string &folder) {
   std::error_code ignored;
   return fs::exists(info_path(folder), ignored) || fs::exists(events_path(folder), ignored);
+}
+
+Result<std::string> move_record_aside(const std::string &folder) {
+  if (!has_flight_record(folder)) return std::string();
+  std::string aside;
+  std::error_code error;
+  for (int number = 1; aside.empty() || fs::exists(aside, error); ++number) {
+    aside = folder + "." + std::to_string(number);
+  }
+  fs::rename(folder, aside, error);
+  if (error) return file_error(folder, 0, "cannot rename to '" + aside + "': " + error.message());
+  return aside;
 }
 
 Result<void> remove_flight_record(const std::string &folder) {

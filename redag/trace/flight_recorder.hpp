@@ -58,11 +58,16 @@ struct Recovered {
   std::uint64_t damaged = 0;      // blocks that were not written completely; the blocks after them are not used
 };
 
-/// Reads the record in `folder`. Errors: there is none, it is still being written, or it has another format.
-[[nodiscard]] Result<Recovered> recover(const std::string &folder);
+/// Reads the record in `folder`. `end_of_run`: of one that has ended, all of whose events were appended; the trace
+/// then ends there. Errors: there is no record, it is still being written, or it has another format.
+[[nodiscard]] Result<Recovered> recover(const std::string &folder, Time end_of_run = kNever);
 
 /// Returns true if there is a record in `folder`.
 [[nodiscard]] bool has_flight_record(const std::string &folder);
+
+/// Renames a record that an earlier run has left in `folder` to the first free of "<folder>.1", "<folder>.2", ... and
+/// returns the new name; empty if there is none. Error: what the system refused.
+[[nodiscard]] Result<std::string> move_record_aside(const std::string &folder);
 
 /// Deletes a record that is not being written. Error: what the system refused.
 [[nodiscard]] Result<void> remove_flight_record(const std::string &folder);

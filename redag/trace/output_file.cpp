@@ -18,6 +18,19 @@ namespace {
 
 constexpr std::size_t kBufferSize = std::size_t{1} << 20U;
 
+std::string unnamed_path(int descriptor) { return "/proc/self/fd/" + std::to_string(descriptor); }
+
+// Opens a file without a name in the directory of `path`. Returns -1 if that is not possible, or could not be named
+// later.
+int open_unnamed(const std::string &path) {
+  const std::size_t slash = path.rfind('/');
+  const std::string directory = slash == std::string::npos ? "." : path.substr(0, slash + 1);
+  const int descriptor = ::open(directory.c_str(), O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666);
+  if (descriptor < 0 || ::access(unnamed_path(descriptor).c_str(), F_OK) == 0) return descriptor;
+  ::close(descriptor);
+  return -1;
+}
+
 }  // namespace
 
 tl::unexpected<Diagnostics> file_error(const std::string &file, int line, std::string message, std::string hint) {
@@ -26,33 +39,36 @@ tl::unexpected<Diagnostics> file_error(const std::string &file, int line, std::s
       Diagnostics{Diagnostic{Severity::Error, file, line, column, std::move(message), std::move(hint)}});
 }
 
-OutputFile::OutputFile(std::string path, std::string temporary, int descriptor)
-    : path_(std::move(path)), temporary_(std::move(temporary)), descriptor_(descriptor) {
+OutputFile::OutputFile(std::string path, int descriptor, bool is_named)
+    : path_(std::move(path)), descriptor_(descriptor), is_named_(is_named) {
   buffer_.reserve(kBufferSize + kBufferSize / 16);
 }
 
 OutputFile::OutputFile(OutputFile &&other) noexcept
     : path_(std::move(other.path_)),
-      temporary_(std::move(other.temporary_)),
       descriptor_(std::exchange(other.descriptor_, -1)),
+      is_named_(std::exchange(other.is_named_, false)),
       error_(other.error_),
       buffer_(std::move(other.buffer_)) {}
 
 OutputFile::~OutputFile() {
-  if (descriptor_ < 0) return;
-  ::close(descriptor_);
-  ::unlink(temporary_.c_str());
+  if (descriptor_ >= 0) ::close(descriptor_);
+  if (is_named_) ::unlink(temporary().c_str());
 }
 
+std::string OutputFile::temporary() const { return path_ + ".tmp." + std::to_string(::getpid()); }
+
 Result<OutputFile> OutputFile::create(std::string path) {
-  std::string temporary = path + ".tmp." + std::to_string(::getpid());
-  const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (descriptor < 0) {
+  if (const int descriptor = open_unnamed(path); descriptor >= 0) return OutputFile(std::move(path), descriptor, false);
+  OutputFile file(std::move(path), -1, false);
+  file.descriptor_ = ::open(file.temporary().c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (file.descriptor_ < 0) {
     const int error = errno;
-    return file_error(path, 0, std::string("cannot write: ") + std::strerror(error),
+    return file_error(file.path_, 0, std::string("cannot write: ") + std::strerror(error),
                       error == ENOENT ? "does the directory exist?" : "");
   }
-  return OutputFile(std::move(path), std::move(temporary), descriptor);
+  file.is_named_ = true;
+  return file;
 }
 
 void OutputFile::write(std::string_view text) {
@@ -67,18 +83,35 @@ void OutputFile::flush() {
     if (written >= 0) {
       rest.remove_prefix(static_cast<std::size_t>(written));
     } else if (errno != EINTR) {
-      error_ = errno;
+      fail();
     }
   }
   buffer_.clear();
 }
 
+// Keeps the first failure.
+void OutputFile::fail() {
+  if (error_ == 0) error_ = errno;
+}
+
 Result<void> OutputFile::commit() {
   flush();
-  if (::close(std::exchange(descriptor_, -1)) != 0 && error_ == 0) error_ = errno;
-  if (error_ == 0 && std::rename(temporary_.c_str(), path_.c_str()) != 0) error_ = errno;
-  if (error_ == 0) return {};
-  ::unlink(temporary_.c_str());
+  const std::string temporary = this->temporary();
+  if (error_ == 0 && !is_named_) {
+    ::unlink(temporary.c_str());  // of an earlier process with this id
+    if (::linkat(AT_FDCWD, unnamed_path(descriptor_).c_str(), AT_FDCWD, temporary.c_str(), AT_SYMLINK_FOLLOW) != 0) {
+      fail();
+    } else {
+      is_named_ = true;
+    }
+  }
+  if (::close(std::exchange(descriptor_, -1)) != 0) fail();
+  if (error_ == 0 && std::rename(temporary.c_str(), path_.c_str()) != 0) fail();
+  if (error_ == 0) {
+    is_named_ = false;
+    return {};
+  }
+  if (std::exchange(is_named_, false)) ::unlink(temporary.c_str());
   return file_error(path_, 0, std::string("cannot write: ") + std::strerror(error_));
 }
 

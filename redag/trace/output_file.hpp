@@ -1,8 +1,10 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A file that appears completely or not at all: written under a temporary name in the same directory, and renamed by
-// commit(). Every error (unwritable directory, full disk) is kept and reported by commit(). Not thread-safe.
+// A file that appears completely or not at all: written without a name in its directory, so that a killed process
+// leaves nothing behind, and named by commit(). Where the file system has no files without a name, "<path>.tmp.<pid>"
+// is written and renamed. Every error (unwritable directory, full disk) is kept and reported by commit(). Not
+// thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -15,31 +17,33 @@ namespace redag::trace {
 
 class OutputFile {
  public:
-  /// Opens "<path>.tmp.<pid>". The directory must exist.
+  /// The directory must exist.
   [[nodiscard]] static Result<OutputFile> create(std::string path);
 
   OutputFile(OutputFile &&other) noexcept;
   OutputFile &operator=(OutputFile &&) = delete;
   OutputFile(const OutputFile &) = delete;
   OutputFile &operator=(const OutputFile &) = delete;
-  /// Without commit(), removes the temporary file and leaves `path` as it was.
+  /// Without commit(), leaves `path` as it was, and nothing beside it.
   ~OutputFile();
 
   /// Appends, buffered. Does nothing after an error.
   void write(std::string_view text);
 
-  /// Flushes and renames the file to its final name, replacing an existing file.
+  /// Flushes the file and gives it its name, replacing an existing file.
   [[nodiscard]] Result<void> commit();
 
  private:
-  OutputFile(std::string path, std::string temporary, int descriptor);
+  OutputFile(std::string path, int descriptor, bool is_named);
 
   void flush();
+  void fail();
+  [[nodiscard]] std::string temporary() const;
 
   std::string path_;
-  std::string temporary_;
   int descriptor_ = -1;
-  int error_ = 0;  // errno of the first failure
+  bool is_named_ = false;  // it has its temporary name
+  int error_ = 0;          // errno of the first failure
   std::string buffer_;
 };
 

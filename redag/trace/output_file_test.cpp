@@ -3,10 +3,15 @@
 
 #include "redag/trace/output_file.hpp"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <filesystem>
+#include <string>
 
 namespace redag::trace {
 namespace {
@@ -78,21 +83,38 @@ TEST_F(OutputFileTest, FailedRenameIsReportedAndCleansUp) {
   EXPECT_EQ(entries(), 1U);
 }
 
-TEST(OutputFile, FullDiskIsReported) {
-  // /dev/full fails every write, but cannot be renamed over. Writes to it through a link with the temporary's name.
-  const fs::path directory = fs::path(testing::TempDir()) / ("redag_full." + std::to_string(::getpid()));
-  fs::create_directories(directory);
-  if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
-  const std::string target = (directory / "a.csv").string();
-  fs::create_symlink("/dev/full", target + ".tmp." + std::to_string(::getpid()));
-  auto file = OutputFile::create(target);
-  ASSERT_TRUE(file) << to_string(file.error());
-  file->write("x");
-  const auto committed = file->commit();
-  ASSERT_FALSE(committed);
-  EXPECT_NE(committed.error().front().message.find("No space"), std::string::npos);
-  EXPECT_FALSE(fs::exists(target));
-  fs::remove_all(directory);
+TEST_F(OutputFileTest, AnAbortedProcessLeavesNothing) {
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    auto file = OutputFile::create(path("a.csv"));
+    file->write(std::string(3'000'000, 'x'));
+    ::_exit(0);  // without destructors, as a killed process
+  }
+  ASSERT_EQ(::waitpid(child, nullptr, 0), child);
+  const int unnamed = ::open(directory_.c_str(), O_WRONLY | O_TMPFILE | O_CLOEXEC, 0600);
+  if (unnamed < 0) GTEST_SKIP() << "the file system has no files without a name";
+  ::close(unnamed);
+  EXPECT_EQ(entries(), 0U);
+}
+
+TEST_F(OutputFileTest, AFullDiskIsReported) {
+  // The limit on the length of a file refuses writes as a full disk does, in a process of its own.
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    ::signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{100'000, 100'000};
+    auto file = OutputFile::create(path("a.csv"));
+    if (!file || ::setrlimit(RLIMIT_FSIZE, &limit) != 0) ::_exit(1);
+    for (int i = 0; i < 4; ++i) file->write(std::string(1'000'000, 'x'));
+    const auto committed = file->commit();
+    ::_exit(!committed && committed.error().front().message == "cannot write: File too large" ? 0 : 2);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  EXPECT_EQ(status, 0);
+  EXPECT_EQ(entries(), 0U);
 }
 
 TEST(ReadFile, DevicesAndLongFilesAreErrors) {

@@ -117,6 +117,21 @@ std::vector<Remark> remarks_from(const Json &json) {
   return remarks;
 }
 
+// Present only in runs of an Executor with such tasks.
+std::vector<TaskId> event_tasks_from(const Json &json, std::size_t task_count) {
+  std::vector<TaskId> tasks;
+  const auto rows = json.find("event_tasks");
+  if (rows == json.end()) return tasks;
+  if (!rows->is_array()) throw BadValue("'event_tasks' must be a list");
+  for (const Json &row : *rows) {
+    if (!row.is_number_unsigned() || row.get<std::uint64_t>() >= task_count) {
+      throw BadValue("'event_tasks' must list positions of tasks in the workload");
+    }
+    tasks.emplace_back(row.get<std::size_t>());
+  }
+  return tasks;
+}
+
 RunInfo info_from(const Json &json) {
   RunInfo info;
   info.executor = text_of(json, "executor");
@@ -167,6 +182,7 @@ std::string run_info_to_json(const RunInfo &info) {
                                {"ended_ns", remark.ended == kNever ? Json() : Json(remark.ended)},
                                {"text", remark.text}});
   }
+  for (const TaskId task : info.event_tasks) json["event_tasks"].push_back(task.value);
   // Texts from outside may not be UTF-8; a replaced character is better than no file.
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
@@ -181,6 +197,7 @@ Result<RunInfo> run_info_from_json(std::string_view text, const std::string &fil
         parse_workload(text_of(json, "workload"), file + " (workload)", {.wcet_optional = true});
     if (!loaded) return tl::unexpected<Diagnostics>(std::move(loaded.error()));
     info.workload = std::move(loaded->workload);
+    info.event_tasks = event_tasks_from(json, info.workload.task_count());
     return info;
   } catch (const BadValue &error) {
     return file_error(file, line, error.what());

@@ -65,6 +65,7 @@ struct RunInfo {
   Machine machine;
   Provenance provenance;  // of the program that ran it; unknown in files from before this block existed
   std::vector<Remark> remarks;
+  std::vector<TaskId> event_tasks;  // timer tasks that the program releases: no grid, at least a period apart
 };
 
 struct Trace {

@@ -1,0 +1,55 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// The deadline misses of an engine, on their way to the thread that reports them. note() runs under the engine's lock,
+// which makes its callers one writer; it never waits and never allocates. One thread takes what was noted.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "redag/base/atomic.hpp"
+#include "redag/base/ids.hpp"
+#include "redag/base/time.hpp"
+#include "redag/model/job_event.hpp"
+#include "redag/runtime/bounded_queue.hpp"
+#include "redag/runtime/executor_options.hpp"
+#include "redag/runtime/parker.hpp"
+
+namespace redag::runtime {
+
+struct Miss {
+  Time at = 0;            // when the scheduler learned of it
+  Duration lateness = 0;  // of a job that finished
+  TaskId task;
+  std::uint32_t job = 0;
+  MissKind kind = MissKind::Late;
+  Reason reason = Reason::None;
+};
+
+class MissLog {
+ public:
+  explicit MissLog(std::size_t capacity) : queue_(capacity) {}
+
+  /// Returns true if the thread that reports misses must be woken: parker().unpark().
+  [[nodiscard]] bool note(const Miss &miss) {
+    if (writer_.push(miss)) return true;
+    dropped_.store(dropped_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    return false;
+  }
+
+  [[nodiscard]] std::optional<Miss> take() { return reader_.pop(); }
+  /// How many misses found no room.
+  [[nodiscard]] std::uint64_t dropped() const { return dropped_.load(std::memory_order_relaxed); }
+  [[nodiscard]] Parker &parker() { return parker_; }
+
+ private:
+  BoundedQueue<Miss> queue_;
+  BoundedQueue<Miss>::Writer writer_ = queue_.writer();
+  BoundedQueue<Miss>::Reader reader_ = queue_.reader();
+  Atomic<std::uint64_t> dropped_{0};
+  Parker parker_;
+};
+
+}  // namespace redag::runtime

@@ -1,0 +1,228 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// ExecutorOptions::record: what is left of a run, and of a process that is killed.
+#include "redag/runtime/recorder.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+#include <string>
+#include <thread>
+
+#include "redag/runtime/executor.hpp"
+#include "redag/trace/events_file.hpp"
+#include "redag_analysis/metrics/summary.hpp"
+#include "redag_analysis/metrics/trace_checker.hpp"
+#include "redag_testing/one_worker.hpp"
+
+namespace redag::runtime {
+namespace {
+
+using namespace std::chrono_literals;
+namespace fs = std::filesystem;
+
+// Each test has a folder of its own, which goes with it.
+class Record : public ::testing::Test {
+ protected:
+  Record()
+      : folder_(fs::temp_directory_path() / ("redag_record_" + std::to_string(::getpid()) + "_" +
+                                             ::testing::UnitTest::GetInstance()->current_test_info()->name())) {
+    fs::remove_all(folder_);
+  }
+  ~Record() override { fs::remove_all(folder_); }
+
+  [[nodiscard]] ExecutorOptions recording(PreemptionMode mode = PreemptionMode::None) const {
+    ExecutorOptions options = testing::one_worker(mode);
+    options.name = "robot";
+    options.record = folder_.string();
+    return options;
+  }
+  [[nodiscard]] trace::Trace trace() const {
+    Result<trace::Trace> read = trace::read_trace((folder_ / "events.jsonl").string());
+    if (!read) throw std::runtime_error(to_string(read.error()));
+    return *std::move(read);
+  }
+  static void expect_right(const trace::Trace &trace) {
+    const metrics::CheckReport report = metrics::check_trace(trace, metrics::rules_for(trace.info));
+    EXPECT_TRUE(report.ok()) << report.to_string();
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(Record, ARunBecomesATraceThatTheCheckerAccepts) {
+  for (const PreemptionMode mode : {PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Auto}) {
+    std::uint64_t finished = 0;
+    {
+      Executor executor(recording(mode));
+      DagBuilder control("control", {.max_active = 1, .deadline = 5ms});
+      int jobs = 0;
+      const TaskHandle imu = control.timer("imu", 2ms, [] {}, {.wcet = 300us});
+      const TaskHandle ekf = control.data("ekf", {imu}, [] {});
+      control.data("pid", {ekf}, [&] {
+        if (++jobs == 100) executor.stop();
+      });
+      const DagId dag = executor.add(std::move(control));
+      executor.run();
+      finished = executor.stats(dag)[2].jobs.finished;
+      EXPECT_TRUE(fs::exists(folder_ / "events.jsonl")) << "written when run() returns";
+      EXPECT_FALSE(fs::exists(folder_ / "flight"));
+    }
+    const trace::Trace recorded = trace();
+    expect_right(recorded);
+    EXPECT_EQ(recorded.info.lost_events, 0U);
+    EXPECT_EQ(recorded.info.workload.name, "robot");
+    ASSERT_EQ(recorded.info.workload.dags.size(), 1U);
+    EXPECT_EQ(recorded.info.workload.dags[0].deadline, 5 * kMillisecond);
+    EXPECT_EQ(recorded.info.workload.dags[0].tasks[0].wcet, 300 * kMicrosecond);
+    EXPECT_GT(recorded.info.workload.dags[0].tasks[1].wcet, 0) << "measured";
+    const metrics::Summary summary = metrics::summarize(recorded);
+    // The job that stopped the run ended after it.
+    EXPECT_GE(summary.tasks[2].jobs.finished + 1, finished);
+    EXPECT_GE(summary.tasks[2].jobs.finished, 99U);
+  }
+}
+
+TEST_F(Record, DagsThatComeAndGoAndEventsAreInIt) {
+  {
+    Executor executor(recording());
+    std::atomic<int> scans{0};
+    int rounds = 0;
+    DagBuilder lidar("lidar");
+    const EventHandle scan = lidar.event("scan", 1ms, [&] { ++scans; });
+    lidar.data("detect", {scan}, [] {});
+    executor.add(std::move(lidar));
+    DagId inspection;
+    DagBuilder supervisor("supervisor");
+    supervisor.timer("decide", 10ms, [&] {
+      if (rounds > 0) executor.remove(inspection);
+      DagBuilder dag("inspection");
+      const TaskHandle camera = dag.timer("camera", 2ms, [] {});
+      dag.timer("check", 2ms, [] {}, {.after = {camera}});
+      inspection = executor.add(std::move(dag));
+      if (++rounds == 4) executor.stop();
+    });
+    executor.add(std::move(supervisor));
+    executor.start();
+    while (scans < 5) {
+      executor.release(scan);
+      std::this_thread::sleep_for(1ms);
+    }
+    executor.wait();
+  }
+  const trace::Trace recorded = trace();
+  expect_right(recorded);
+  EXPECT_EQ(recorded.info.event_tasks, std::vector<TaskId>{TaskId(0)});
+  ASSERT_EQ(recorded.info.workload.dags.size(), 6U);
+  EXPECT_EQ(recorded.info.workload.dags[2].name, "inspection");
+  EXPECT_EQ(recorded.info.workload.dags[3].name, "inspection #2");
+  EXPECT_GE(recorded.info.workload.dags[3].tasks[0].offset, 10 * kMillisecond) << "its grid begins when it was added";
+}
+
+TEST_F(Record, AnEarlierRunIsReplacedAndAnUnfinishedOneIsMovedAside) {
+  const auto run = [&] {
+    Executor executor(recording());
+    DagBuilder dag("dag");
+    dag.timer("t", 1ms, [] {});
+    executor.add(std::move(dag));
+    executor.run_for(20ms);
+    return executor.warnings();
+  };
+  run();
+  const trace::Trace first = trace();
+  fs::create_directory(folder_ / "flight");
+  std::ofstream(folder_ / "flight" / "run.json") << "{}";
+  const std::vector<std::string> warnings = run();
+  EXPECT_NE(trace().info.provenance.created + std::to_string(trace().info.end),
+            first.info.provenance.created + std::to_string(first.info.end));
+  ASSERT_FALSE(warnings.empty());
+  EXPECT_NE(warnings.back().find("flight.1"), std::string::npos) << warnings.back();
+  EXPECT_TRUE(fs::exists(folder_ / "flight.1" / "run.json"));
+}
+
+TEST_F(Record, AKilledProcessLeavesARecordThatCanBeRecovered) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    Executor executor(recording());
+    DagBuilder dag("dag");
+    int jobs = 0;
+    dag.timer("t", 1ms, [&] {
+      // By then the recorder has written several times.
+      if (++jobs == 500) ::kill(::getpid(), SIGKILL);
+    });
+    executor.add(std::move(dag));
+    executor.run();
+    ::_exit(0);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFSIGNALED(status));
+  const Result<trace::Recovered> recovered = trace::recover((folder_ / "flight").string());
+  ASSERT_TRUE(recovered) << to_string(recovered.error());
+  expect_right(recovered->trace);
+  EXPECT_GT(metrics::summarize(recovered->trace).tasks[0].jobs.finished, 100U);
+}
+
+TEST_F(Record, AFolderThatCannotBeWrittenIsRefusedAtOnce) {
+  std::ofstream(folder_.string()) << "a file";
+  try {
+    const Executor executor(recording());
+    FAIL() << "accepted";
+  } catch (const std::runtime_error &error) {
+    EXPECT_NE(std::string(error.what()).find(folder_.string()), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("cannot create the folder"), std::string::npos) << error.what();
+  }
+}
+
+TEST_F(Record, ARunThatNeverBeganLeavesNothing) {
+  {
+    Executor executor(recording());
+    DagBuilder dag("dag");
+    dag.timer("t", 1ms, [] {});
+    executor.add(std::move(dag));
+  }
+  EXPECT_TRUE(fs::is_empty(folder_));
+}
+
+TEST_F(Record, ARunWithoutDagsLeavesNothing) {
+  {
+    Executor executor(recording());
+    executor.run_for(10ms);
+  }
+  EXPECT_TRUE(fs::is_empty(folder_));
+}
+
+TEST_F(Record, TheEventsBelongToTheRecord) {
+  Executor executor(recording());
+  std::vector<JobEvent> events;
+  EXPECT_THROW(executor.drain(events), std::logic_error);
+}
+
+TEST_F(Record, AFullRecordKeepsTheNewestEvents) {
+  ExecutorOptions options = recording();
+  options.record_bytes = std::uint64_t{64} << 10U;
+  {
+    Executor executor(options);
+    DagBuilder dag("dag");
+    int jobs = 0;
+    dag.timer("t", 100us, [&] {
+      if (++jobs == 1000) executor.stop();
+    });
+    executor.add(std::move(dag));
+    executor.run();
+  }
+  const trace::Trace recorded = trace();
+  EXPECT_GT(recorded.info.lost_events, 0U);
+  ASSERT_FALSE(recorded.events.empty());
+  EXPECT_GT(recorded.events.back().job, 900U);
+}
+
+}  // namespace
+}  // namespace redag::runtime
