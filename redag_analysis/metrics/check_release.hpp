@@ -41,6 +41,7 @@ class ReleaseRules {
   };
   struct TaskState {
     bool timer = true;
+    bool on_grid = true;  // false: the program releases its jobs
     Overrun overrun = Overrun::Skip;
     std::uint32_t queue_depth = 0;
     std::vector<std::uint32_t> in;   // edges

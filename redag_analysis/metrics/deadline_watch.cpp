@@ -5,16 +5,15 @@
 
 namespace redag::metrics {
 
-DeadlineWatch::DeadlineWatch(const Workload &workload) : folder_(workload) {
-  end_to_end_.reserve(workload.task_count());
-  for (const Dag &dag : workload.dags) end_to_end_.insert(end_to_end_.end(), dag.tasks.size(), dag.deadline);
-}
+DeadlineWatch::DeadlineWatch(const Workload &workload)
+    : is_sink_(sinks_of(workload)), end_to_end_(end_to_end_deadlines(workload)), folder_(workload) {}
 
 JudgedJob DeadlineWatch::judge(const JobRecord &record, Time until) const {
-  JudgedJob judged{record, std::nullopt, std::nullopt, miss_of(record, until, end_to_end_[record.task.value])};
+  const std::size_t task = record.task.value;
+  JudgedJob judged{record, std::nullopt, std::nullopt, miss_of(record, until, end_to_end_[task])};
   if (has_no_response(record)) return judged;
   judged.response = until - record.release;
-  if (record.origin != kNever) judged.end_to_end = until - record.origin;
+  if (is_sink_[task] && record.origin != kNever) judged.end_to_end = until - record.origin;
   return judged;
 }
 

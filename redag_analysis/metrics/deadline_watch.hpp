@@ -19,7 +19,7 @@ namespace redag::metrics {
 struct JudgedJob {
   const JobRecord &record;
   std::optional<Duration> response;    // f - r; empty for lost jobs
-  std::optional<Duration> end_to_end;  // f - origin; empty for lost jobs and for those that never carried data
+  std::optional<Duration> end_to_end;  // f - origin of a sink; empty if lost or without data
   Miss miss = Miss::None;
 };
 
@@ -43,7 +43,8 @@ class DeadlineWatch {
  private:
   [[nodiscard]] JudgedJob judge(const JobRecord &record, Time until) const;
 
-  std::vector<Duration> end_to_end_;  // by TaskId: the DAG's deadline; 0: none
+  std::vector<bool> is_sink_;         // by TaskId
+  std::vector<Duration> end_to_end_;  // by TaskId: the deadline of its DAG; 0: none
   JobFolder folder_;
 };
 

@@ -7,6 +7,7 @@
 
 #include <string>
 
+#include "redag_analysis/metrics/summary.hpp"
 #include "redag_testing/builders.hpp"
 #include "redag_testing/trace_builder.hpp"
 
@@ -44,7 +45,7 @@ TEST(DeadlineWatch, InTime) {
   TraceBuilder t(pipeline());
   t.at(0).arrives("sense", 0).dispatched("sense", 0, 0, 10).at(1).finished("sense", 0, 0);
   t.released("act", 0).ready("act", 0, 0).dispatched("act", 0, 0, 11).at(6).finished("act", 0, 0);
-  EXPECT_EQ(seen(t, 10), "sense#0 none 1/1; act#0 none 5/6; ");
+  EXPECT_EQ(seen(t, 10), "sense#0 none 1/-; act#0 none 5/6; ");
 }
 
 TEST(DeadlineWatch, TheDeadlineOfTheTaskIsNamedBeforeThatOfTheDag) {
@@ -52,7 +53,7 @@ TEST(DeadlineWatch, TheDeadlineOfTheTaskIsNamedBeforeThatOfTheDag) {
   t.at(0).arrives("sense", 0).dispatched("sense", 0, 0, 10).at(1).finished("sense", 0, 0);
   t.released("act", 0).ready("act", 0, 0).dispatched("act", 0, 0, 11).at(7).finished("act", 0, 0);
   t.at(10).arrives("sense", 1).dispatched("sense", 1, 0, 20).at(21).finished("sense", 1, 0);
-  EXPECT_EQ(seen(t, 30), "sense#0 none 1/1; act#0 end_to_end 6/7; sense#1 deadline 11/11; ");
+  EXPECT_EQ(seen(t, 30), "sense#0 none 1/-; act#0 end_to_end 6/7; sense#1 deadline 11/-; ");
 }
 
 TEST(DeadlineWatch, LostJobsHaveNoResponse) {
@@ -70,13 +71,24 @@ TEST(DeadlineWatch, NoDataIsNoMiss) {
 
 TEST(DeadlineWatch, InFlightHasAnsweredNoSoonerThanTheEnd) {
   TraceBuilder t(pipeline());
-  t.at(0).arrives("sense", 0).dispatched("sense", 0, 0, 10);
-  EXPECT_EQ(seen(t, 6), "sense#0 none 6/6; ");
-  EXPECT_EQ(seen(t, 7), "sense#0 end_to_end 7/7; ");
-  EXPECT_EQ(seen(t, 11), "sense#0 deadline 11/11; ");
+  t.at(0).arrives("sense", 0).dispatched("sense", 0, 0, 10).at(1).finished("sense", 0, 0);
+  t.released("act", 0).ready("act", 0, 0).dispatched("act", 0, 0, 11);
+  EXPECT_EQ(seen(t, 6), "sense#0 none 1/-; act#0 none 5/6; ");
+  EXPECT_EQ(seen(t, 7), "sense#0 none 1/-; act#0 end_to_end 6/7; ");
+  EXPECT_EQ(seen(t, 12), "sense#0 none 1/-; act#0 deadline 11/12; ");
   TraceBuilder waiting(pipeline());
   waiting.at(0).released("sense", 0);
   EXPECT_EQ(seen(waiting, 9), "sense#0 none 9/-; ");
+}
+
+// docs/model.md, "What is measured": the end-to-end deadline is that of sinks, as in the summary.
+TEST(DeadlineWatch, OnlySinksHaveTheEndToEndDeadline) {
+  Workload workload = pipeline();
+  workload.dags[0].tasks[0].deadline = 20 * kMs;
+  TraceBuilder t(workload);
+  t.at(0).arrives("sense", 0).dispatched("sense", 0, 0, 20).at(8).finished("sense", 0, 0);
+  EXPECT_EQ(seen(t, 9), "sense#0 none 8/-; ");
+  EXPECT_EQ(summarize(t.until(9)).dags[0].end_to_end.late, 0U);
 }
 
 }  // namespace

@@ -3,8 +3,10 @@
 
 #include "redag_analysis/metrics/jobs_csv.hpp"
 
+#include <fmt/compile.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <iterator>
 #include <map>
@@ -22,19 +24,6 @@ constexpr std::string_view kHeader =
     "sequence,dag,task,job,release_ns,ready_ns,start_ns,finish_ns,deadline_ns,origin_ns,worker,on_worker_ns,"
     "preemptions,deferred,outcome,reason,response_ns,response_from_ready_ns,lateness_ns";
 constexpr std::size_t kColumns = 19;
-
-// Quotes a field by RFC 4180: one with a comma, a quote or a line break is put in quotes, and its quotes are doubled.
-std::string quoted(const std::string &text) {
-  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
-  std::string result = "\"";
-  for (const char c : text) {
-    if (c == '"') result += '"';
-    result += c;
-  }
-  return result + '"';
-}
-
-std::string time_field(Time time) { return time == kNever ? std::string() : std::to_string(time); }
 
 // Takes the next record off `text`; returns false if a quote is not closed.
 bool take_record(std::string_view &text, std::vector<std::string> &fields, int &lines) {
@@ -105,37 +94,98 @@ const char *read_row(const std::vector<std::string> &fields, JobRecord &job) {
   return nullptr;
 }
 
+std::string row_of(const JobRecord &job, const std::string &name) {
+  std::string row;
+  const auto out = std::back_inserter(row);
+  const auto time = [&row, out](Time value) {
+    if (value != kNever) fmt::format_to(out, FMT_COMPILE("{}"), value);
+    row += ',';
+  };
+  fmt::format_to(out, FMT_COMPILE("{},{},{},"), job.sequence, name, job.number);
+  for (const Time value : {job.release, job.ready, job.start, job.finish, job.deadline, job.origin}) time(value);
+  if (job.worker != WorkerId::kNoneValue) fmt::format_to(out, FMT_COMPILE("{}"), job.worker);
+  fmt::format_to(out, FMT_COMPILE(",{},{},{},{},{},"), job.on_worker, job.preemptions, job.deferred ? 1 : 0,
+                 to_string(job.outcome), to_string(job.reason));
+  if (job.outcome == JobOutcome::Finished) {
+    fmt::format_to(out, FMT_COMPILE("{},{},{}\n"), job.response(), job.response_from_ready(), job.lateness());
+  } else {
+    row += ",,\n";
+  }
+  return row;
+}
+
+// The order of a heap whose front was released first.
+bool released_later(const JobRecord &a, const JobRecord &b) { return a.sequence > b.sequence; }
+
 }  // namespace
 
+std::string csv_quoted(const std::string &text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  // A field with a comma, a quote or a line break is put in quotes, and its quotes are doubled.
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"') result += '"';
+    result += c;
+  }
+  return result + '"';
+}
+
+std::vector<std::string> csv_task_names(const Workload &workload) {
+  std::vector<std::string> names;
+  for (const Dag &dag : workload.dags) {
+    for (const Task &task : dag.tasks) names.push_back(csv_quoted(dag.name) + "," + csv_quoted(task.name));
+  }
+  return names;
+}
+
 std::string_view jobs_csv_header() { return kHeader; }
+
+JobsCsvWriter::JobsCsvWriter(trace::OutputFile file, const Workload &workload, std::size_t most_held)
+    : file_(std::move(file)), names_(csv_task_names(workload)), folder_(workload), most_held_(most_held) {
+  file_.write(kHeader);
+  file_.write("\n");
+}
+
+Result<JobsCsvWriter> JobsCsvWriter::create(const std::string &path, const Workload &workload, std::size_t most_held) {
+  Result<trace::OutputFile> file = trace::OutputFile::create(path);
+  if (!file) return tl::unexpected<Diagnostics>(std::move(file.error()));
+  return JobsCsvWriter(*std::move(file), workload, most_held);
+}
+
+void JobsCsvWriter::add(std::span<const JobEvent> events) {
+  folder_.add(events);
+  folder_.drain_ended([this](const JobRecord &job) { hold(job); });
+}
+
+void JobsCsvWriter::hold(const JobRecord &job) {
+  held_.push_back(job);
+  std::push_heap(held_.begin(), held_.end(), released_later);
+  while (!held_.empty() && (held_.front().sequence <= next_ || held_.size() > most_held_)) write_first();
+}
+
+void JobsCsvWriter::write_first() {
+  std::pop_heap(held_.begin(), held_.end(), released_later);
+  const JobRecord &job = held_.back();
+  file_.write(row_of(job, names_.at(job.task.value)));
+  next_ = std::max(next_, job.sequence + 1);
+  held_.pop_back();
+}
+
+Result<void> JobsCsvWriter::commit() {
+  const std::vector<JobRecord> live = folder_.in_flight();
+  held_.insert(held_.end(), live.begin(), live.end());
+  std::make_heap(held_.begin(), held_.end(), released_later);
+  while (!held_.empty()) write_first();
+  return file_.commit();
+}
 
 Result<void> write_jobs_csv(const std::string &path, const Workload &workload, std::span<const JobRecord> jobs) {
   Result<trace::OutputFile> file = trace::OutputFile::create(path);
   if (!file) return tl::unexpected<Diagnostics>(std::move(file.error()));
-  std::vector<std::string> names;  // "dag,task" per TaskId
-  for (const Dag &dag : workload.dags) {
-    for (const Task &task : dag.tasks) names.push_back(quoted(dag.name) + "," + quoted(task.name));
-  }
+  const std::vector<std::string> names = csv_task_names(workload);
   file->write(kHeader);
   file->write("\n");
-  fmt::memory_buffer line;
-  for (const JobRecord &job : jobs) {
-    line.clear();
-    const bool finished = job.outcome == JobOutcome::Finished;
-    const auto out = std::back_inserter(line);
-    fmt::format_to(out, "{},{},{},{},{},{},{},{},{},", job.sequence, names.at(job.task.value), job.number,
-                   time_field(job.release), time_field(job.ready), time_field(job.start), time_field(job.finish),
-                   time_field(job.deadline), time_field(job.origin));
-    if (job.worker != WorkerId::kNoneValue) fmt::format_to(out, "{}", job.worker);
-    fmt::format_to(out, ",{},{},{:d},{},{}", job.on_worker, job.preemptions, job.deferred, to_string(job.outcome),
-                   to_string(job.reason));
-    if (finished) {
-      fmt::format_to(out, ",{},{},{}\n", job.response(), job.response_from_ready(), job.lateness());
-    } else {
-      fmt::format_to(out, ",,,\n");
-    }
-    file->write({line.data(), line.size()});
-  }
+  for (const JobRecord &job : jobs) file->write(row_of(job, names.at(job.task.value)));
   return file->commit();
 }
 

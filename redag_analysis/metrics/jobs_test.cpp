@@ -114,6 +114,49 @@ TEST(JobsCsv, ReadsBackWhatItWrote) {
   std::filesystem::remove(path);
 }
 
+std::string csv_of(const trace::Trace &trace, std::size_t most_held) {
+  const std::string path =
+      (std::filesystem::path(::testing::TempDir()) / ("redag_rows." + std::to_string(::getpid()) + ".csv")).string();
+  auto writer = JobsCsvWriter::create(path, trace.info.workload, most_held);
+  EXPECT_TRUE(writer);
+  for (const JobEvent &event : trace.events) writer->add(std::span(&event, 1));
+  EXPECT_TRUE(writer->commit());
+  std::string text = trace::read_file(path).value();
+  std::filesystem::remove(path);
+  return text;
+}
+
+std::vector<std::uint64_t> sequences_of(const trace::Trace &trace, std::size_t most_held) {
+  std::vector<std::uint64_t> sequences;
+  const auto jobs = parse_jobs_csv(csv_of(trace, most_held), "jobs.csv", trace.info.workload);
+  EXPECT_TRUE(jobs);
+  for (const JobRecord &job : *jobs) sequences.push_back(job.sequence);
+  return sequences;
+}
+
+TEST(JobsCsv, RowsOfARunThatGoesOnAreInOrderOfRelease) {
+  const trace::Trace trace = example().until(30);
+  const std::string path =
+      (std::filesystem::path(::testing::TempDir()) / ("redag_all." + std::to_string(::getpid()) + ".csv")).string();
+  ASSERT_TRUE(write_jobs_csv(path, trace.info.workload, fold_jobs(trace.info.workload, trace.events)));
+  EXPECT_EQ(csv_of(trace, JobsCsvWriter::kMostHeldJobs), trace::read_file(path).value());
+  std::filesystem::remove(path);
+}
+
+// A job in progress for long must not hold all later ones in memory.
+TEST(JobsCsv, AJobInProgressHoldsUpOnlySoMany) {
+  const Workload w = make_workload({make_dag("a", {{"hi", 10, 1}}), make_dag("b", {{"lo", 1000, 4}})}, 2);
+  TraceBuilder t(w);
+  t.at(0).arrives("lo", 0).dispatched("lo", 0, 0, 1000);
+  for (std::uint32_t job = 0; job < 6; ++job) {
+    t.at(10 * job).arrives("hi", job).dispatched("hi", job, 1, 10 * job + 10).at(10 * job + 1).finished("hi", job, 1);
+  }
+  const trace::Trace trace = t.at(70).finished("lo", 0, 0).arrives("hi", 6).until(80);
+  using Sequences = std::vector<std::uint64_t>;
+  EXPECT_EQ(sequences_of(trace, 100), (Sequences{0, 1, 2, 3, 4, 5, 6, 7}));
+  EXPECT_EQ(sequences_of(trace, 3), (Sequences{1, 2, 3, 4, 5, 6, 0, 7}));
+}
+
 TEST(JobsCsv, MistakesAreReportedAtTheirLine) {
   const Workload workload = example().until(30).info.workload;
   const std::string header = std::string(jobs_csv_header()) + "\n";

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <system_error>
 
+#include "redag/base/lines.hpp"
 #include "redag/base/text.hpp"
 #include "redag/trace/output_file.hpp"
 
@@ -109,9 +110,7 @@ Result<KernelRecord> parse_kernel_record(std::string_view text, const std::strin
   bool complete = false;
   int number = 0;
   while (!text.empty()) {
-    const std::size_t length = text.find('\n');
-    const std::string_view line = text.substr(0, length);
-    text.remove_prefix(length == std::string_view::npos ? text.size() : length + 1);
+    const std::string_view line = next_line(text);
     ++number;
     if (complete) return trace::file_error(file, number, "there is text after the last line");
     const Json json = json_nests_deeper(line) ? Json() : Json::parse(line, nullptr, false);

@@ -22,6 +22,30 @@ bool is_late_end_to_end(const JobRecord &job, Time end, Duration deadline) {
   return answered(job, end) - job.origin > deadline;
 }
 
+std::vector<bool> sinks_of(const Workload &workload) {
+  std::vector<bool> sinks;
+  for (const Dag &dag : workload.dags) {
+    const std::size_t first = sinks.size();
+    sinks.resize(first + dag.tasks.size(), true);
+    for (const Task &task : dag.tasks) {
+      for (const std::uint32_t p : task.predecessors) sinks[first + p] = false;
+    }
+  }
+  return sinks;
+}
+
+std::vector<Duration> end_to_end_deadlines(const Workload &workload) {
+  const std::vector<bool> is_sink = sinks_of(workload);
+  std::vector<Duration> deadlines;
+  deadlines.reserve(is_sink.size());
+  for (const Dag &dag : workload.dags) {
+    for (std::size_t i = 0; i < dag.tasks.size(); ++i) {
+      deadlines.push_back(is_sink[deadlines.size()] ? dag.deadline : Duration{0});
+    }
+  }
+  return deadlines;
+}
+
 Miss miss_of(const JobRecord &job, Time end, Duration end_to_end) {
   if (is_lost(job)) return Miss::Lost;
   if (has_no_response(job)) return Miss::None;

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "redag_analysis/metrics/jobs.hpp"
 
@@ -29,8 +30,15 @@ enum class Miss : std::uint8_t {
 /// exceeds `deadline` already at `end`.
 [[nodiscard]] bool is_late_end_to_end(const JobRecord &job, Time end, Duration deadline);
 
-/// Judges a job. `end` is the end of the run, which counts for jobs in flight. `end_to_end` is the DAG's deadline (0:
-/// none).
+/// Returns, by TaskId, whether the task is a sink: no task waits for it.
+[[nodiscard]] std::vector<bool> sinks_of(const Workload &workload);
+
+/// Returns, by TaskId, the end-to-end deadline that the task's jobs must keep: its DAG's for a sink, 0 (none) for
+/// others. A DAG answers at its sinks; what another task does late shows there.
+[[nodiscard]] std::vector<Duration> end_to_end_deadlines(const Workload &workload);
+
+/// Judges a job. `end` is the end of the run, which counts for jobs in flight. `end_to_end` is its
+/// end-to-end deadline (0: none).
 [[nodiscard]] Miss miss_of(const JobRecord &job, Time end, Duration end_to_end = 0);
 
 }  // namespace redag::metrics

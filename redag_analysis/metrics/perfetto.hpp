@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Writes trace.json for ui.perfetto.dev and chrome://tracing. Each worker has a track with the jobs' slices; each DAG
-// is a process with every job from release to end, misses and skips. Events are written as they are read, and memory
-// does not grow with the run. Format: "Trace Event Format", Chromium project.
+// Writes trace.pftrace for ui.perfetto.dev and trace_processor: a track for each worker with the jobs that it ran, for
+// each task with its jobs from release to end, and counters; with the kernel's record also processors and threads.
+// docs/results_format.md describes them. Events are written as they are read; memory does not grow with the run.
 #pragma once
 
 #include <memory>
@@ -12,18 +12,15 @@
 
 #include "redag/base/result.hpp"
 #include "redag/trace/trace.hpp"
+#include "redag_analysis/metrics/kernel_record.hpp"
 
 namespace redag::metrics {
 
-struct PerfettoOptions {
-  bool flows = true;  // arrows from a job to those that use its data
-};
-
 class PerfettoWriter {
  public:
-  /// Opens the file. `run` must outlive this object; its `end` is not used.
+  /// Opens the file. `run`, whose `end` is not used, and `kernel` must outlive this object. `kernel` may be null.
   [[nodiscard]] static Result<PerfettoWriter> create(const std::string &path, const trace::RunInfo &run,
-                                                     const PerfettoOptions &options = {});
+                                                     const KernelRecord *kernel = nullptr);
   PerfettoWriter(PerfettoWriter &&) noexcept;
   PerfettoWriter &operator=(PerfettoWriter &&) = delete;
   PerfettoWriter(const PerfettoWriter &) = delete;
@@ -42,6 +39,6 @@ class PerfettoWriter {
 };
 
 [[nodiscard]] Result<void> write_perfetto(const std::string &path, const trace::Trace &trace,
-                                          const PerfettoOptions &options = {});
+                                          const KernelRecord *kernel = nullptr);
 
 }  // namespace redag::metrics

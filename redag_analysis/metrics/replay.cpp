@@ -327,13 +327,22 @@ Urgency Replay::urgency_of(const LiveJob &job) {
   urgency.turn = takes_turns ? job.turn : 0;
   urgency.rank = priorities_[job.task.value].rank;
   urgency.sequence = next_sequence_++;
-  switch (config_.policy) {
-    case PolicyKind::Edf: urgency.key = job.deadline; break;
-    case PolicyKind::Fifo: urgency.key = static_cast<std::int64_t>(urgency.sequence); break;
-    default: urgency.key = priorities_[job.task.value].tier; break;
-  }
-  if (high_mode() && is_degradable(job.task)) urgency.key = demoted_key(job.task);
+  urgency.key = high_mode() && is_degradable(job.task) ? demoted_key(job.task)
+                                                       : undemoted_key(job.task, job.deadline, urgency.sequence);
   return urgency;
+}
+
+std::int64_t Replay::undemoted_key(TaskId task, Time deadline, std::uint64_t sequence) const {
+  switch (config_.policy) {
+    case PolicyKind::Edf: return deadline;
+    case PolicyKind::Fifo: return static_cast<std::int64_t>(sequence);
+    default: return priorities_[task.value].tier;
+  }
+}
+
+bool Replay::is_passed_by_demotion(const LiveJob &job, const LiveJob &other) const {
+  const auto key = [this](const LiveJob &one) { return undemoted_key(one.task, one.deadline, one.own.sequence); };
+  return is_demoted(job) && !is_demoted(other) && key(job) <= key(other);
 }
 
 const LiveJob *Replay::running(std::uint32_t worker) const {

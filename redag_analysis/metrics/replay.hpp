@@ -70,6 +70,9 @@ class Replay {
     friend auto operator<=>(const Waiter &, const Waiter &) = default;  // NOLINT(modernize-use-nullptr): a false alarm
   };
   static constexpr std::uint32_t kNoGroup = 0xffffffff;
+  /// What keeps the first ready job of a task from being eligible, in the order of docs/model.md: the concurrency of
+  /// its task, max_active of its DAG, its group, or nothing.
+  enum class Gate : std::uint8_t { NoJob, Task, Dag, Group, Open };
 
   /// `workload` must outlive the replay.
   Replay(const Workload &workload, const sched::Config &config);
@@ -112,9 +115,16 @@ class Replay {
   [[nodiscard]] const std::set<Waiter> &eligible() const { return at_thread_limit() ? none_ : eligible_; }
   /// The same, regardless of `max_started`: some of these jobs may lack only a thread.
   [[nodiscard]] const std::set<Waiter> &eligible_but_for_threads() const { return eligible_; }
+  [[nodiscard]] Gate gate(TaskId id) const { return tasks_[id.value].gate; }
+  /// True while `max_started` jobs are started.
+  [[nodiscard]] bool at_thread_limit() const { return config_.max_started > 0 && started_ >= config_.max_started; }
   /// Tasks whose first ready job waits for its DAG's max_active alone and has not been counted as deferred.
   [[nodiscard]] const std::set<TaskId> &owed_deferral() const { return owed_deferral_; }
 
+  /// True if the job is below all others, except for what it inherits.
+  [[nodiscard]] bool is_demoted(const LiveJob &job) const { return job.own.key == demoted_key(job.task); }
+  /// True if only its demotion keeps `job` from being as urgent as `other`.
+  [[nodiscard]] bool is_passed_by_demotion(const LiveJob &job, const LiveJob &other) const;
   /// The urgency with what the job now inherits from those that wait for its group.
   [[nodiscard]] Urgency inherited(const LiveJob &job) const;
   /// The same, but only from waiting jobs that come before `looked_at`. Jobs are looked at in their order; those after
@@ -127,7 +137,6 @@ class Replay {
   [[nodiscard]] bool goes_first(const Urgency &urgency, bool started, const Urgency &other, bool other_started) const;
 
  private:
-  enum class Gate : std::uint8_t { NoJob, Task, Dag, Group, Open };
   struct TaskState {
     const redag::Task *task = nullptr;
     DagId dag;
@@ -163,7 +172,7 @@ class Replay {
   void refresh_sharers(TaskId task);
   [[nodiscard]] Gate gate_of(const TaskState &task, const LiveJob *&first) const;
   [[nodiscard]] Urgency urgency_of(const LiveJob &job);
-  [[nodiscard]] bool at_thread_limit() const { return config_.max_started > 0 && started_ >= config_.max_started; }
+  [[nodiscard]] std::int64_t undemoted_key(TaskId task, Time deadline, std::uint64_t sequence) const;
 
   sched::Config config_;
   std::vector<sched::Priority> priorities_;

@@ -101,6 +101,7 @@ Summarizer::Summarizer(const trace::RunInfo &run)
       refs_(flatten(run.workload)),
       exact_(exact_jobs_of(refs_.size())),
       is_sink_(sinks_of(run.workload)),
+      end_to_end_deadlines_(end_to_end_deadlines(run.workload)),
       stats_(refs_.size()),
       samples_(refs_.size(), Samples(exact_)),
       end_to_end_(refs_.size(), DurationSketch(exact_)),
@@ -122,7 +123,7 @@ void Summarizer::count(const JobRecord &job, Time end) {
   const Miss miss = miss_of(job, end);
   stats_[task].count(job, miss);
   if (miss != Miss::None) ++missed_[dag];
-  if (is_sink_[task] && is_late_end_to_end(job, end, run_.workload.dags[dag].deadline)) ++end_to_end_late_[task];
+  if (is_late_end_to_end(job, end, end_to_end_deadlines_[task])) ++end_to_end_late_[task];
   Samples &samples = samples_[task];
   if (job.has_started() && job.reason != Reason::NoData) samples.start_latency.add(job.start - job.ready);
   if (job.outcome != JobOutcome::Finished) return;
@@ -195,18 +196,6 @@ Summary Summarizer::finish(Time end) {
   summary.lost_events = run_.lost_events;
   summary.ignored_events = folder_.ignored_events();
   return summary;
-}
-
-std::vector<bool> sinks_of(const Workload &workload) {
-  std::vector<bool> sinks;
-  for (const Dag &dag : workload.dags) {
-    const std::size_t first = sinks.size();
-    sinks.resize(first + dag.tasks.size(), true);
-    for (const Task &task : dag.tasks) {
-      for (const std::uint32_t p : task.predecessors) sinks[first + p] = false;
-    }
-  }
-  return sinks;
 }
 
 Summary summarize(const trace::Trace &trace) {

@@ -152,6 +152,7 @@ class Summarizer {
   std::vector<TaskRef> refs_;
   std::size_t exact_;  // exact jobs of a task
   std::vector<bool> is_sink_;
+  std::vector<Duration> end_to_end_deadlines_;  // by TaskId; 0: none
   std::vector<JobStats> stats_;
   std::vector<Samples> samples_;
   std::vector<DurationSketch> end_to_end_;      // by TaskId; empty unless the task is a sink
@@ -160,9 +161,6 @@ class Summarizer {
   JobFolder folder_;
   Activity activity_;
 };
-
-/// Returns by TaskId whether the task is a sink: no task waits for it.
-[[nodiscard]] std::vector<bool> sinks_of(const Workload &workload);
 
 /// Summarises a whole trace.
 [[nodiscard]] Summary summarize(const trace::Trace &trace);

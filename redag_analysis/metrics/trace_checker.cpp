@@ -3,7 +3,10 @@
 
 #include "redag_analysis/metrics/trace_checker.hpp"
 
+#include <deque>
 #include <limits>
+#include <utility>
+#include <vector>
 
 #include "redag/model/clusters.hpp"
 #include "redag/sched/cluster_config.hpp"
@@ -22,42 +25,44 @@ namespace {
 class Checker {
  public:
   /// `info` is that of the run with the part's workload and config.
-  Checker(const trace::Trace &trace, const trace::RunInfo &info, const ClusterPart &part, const RuleSet &rules,
-          CheckReport &report)
-      : trace_(trace),
+  Checker(trace::RunInfo info, const ClusterPart &part, const RuleSet &rules, CheckReport &report)
+      : info_(std::move(info)),
         part_(part),
-        replay_(info.workload, info.config),
-        context_(info, part.tasks, replay_, rules, report),
+        replay_(info_.workload, info_.config),
+        context_(info_, part.tasks, replay_, rules, report),
         releases_(context_),
         decisions_(context_),
         overload_(context_),
         starts_(context_),
-        counts_(info.workload.task_count()) {}
+        counts_(info_.workload.task_count()) {}
 
-  /// `places` are those of all tasks, and `own` is the index of the part. The first part also checks the stream.
-  void run(const std::vector<TaskPlace> &places, std::uint32_t own) {
+  /// Checks event `index` of the run. `places` are those of all tasks, and `own` is the index of the part. The first
+  /// part also checks the stream.
+  void add(std::size_t index, JobEvent event, const std::vector<TaskPlace> &places, std::uint32_t own) {
     const bool is_first = own == 0;
-    if (is_first) {
-      context_.expect(Rule::Stream, trace_.info.lost_events == 0, TaskId(), 0, [&] {
-        return std::to_string(trace_.info.lost_events) + " events were lost: the trace has holes and cannot be checked";
-      });
+    const bool known = event.task.value < places.size();
+    if (known ? places[event.task.value].part == own : is_first) {
+      if (known) event.task = places[event.task.value].task;
+      step(index, event, is_first);
+    } else if (is_first) {
+      check_time(index, event);
     }
-    if (trace_.info.lost_events > 0) return;
-    for (std::size_t i = 0; i < trace_.events.size(); ++i) {
-      JobEvent event = trace_.events[i];
-      const bool known = event.task.value < places.size();
-      if (known ? places[event.task.value].part == own : is_first) {
-        if (known) event.task = places[event.task.value].task;
-        step(i, event, is_first);
-      } else if (is_first) {
-        check_time(i, event);
-      }
-    }
+  }
+
+  void end_of_trace(Time end) {
+    info_.end = end;
     end_of_instant();
     releases_.end_of_trace();
     decisions_.end_of_trace();
     starts_.end_of_trace();
     check_conservation();
+  }
+
+  void check_loss(std::uint64_t lost_events) {
+    context_.at(0, 0);
+    context_.expect(Rule::Stream, lost_events == 0, TaskId(), 0, [&] {
+      return std::to_string(lost_events) + " events were lost: the trace has holes and cannot be checked";
+    });
   }
 
  private:
@@ -130,7 +135,7 @@ class Checker {
     }
   }
 
-  const trace::Trace &trace_;
+  trace::RunInfo info_;
   const ClusterPart &part_;
   Replay replay_;
   CheckContext context_;
@@ -161,17 +166,53 @@ RuleSet rules_for(const trace::RunInfo &info) {
   return RuleSet::all();
 }
 
-CheckReport check_trace(const trace::Trace &trace, const RuleSet &rules) {
-  CheckReport report;
-  const std::vector<ClusterPart> parts = parts_of(trace.info.workload);
-  const std::vector<TaskPlace> places = places_in(parts);
-  for (std::uint32_t p = 0; p < parts.size(); ++p) {
-    trace::RunInfo info = trace.info;
-    info.workload = parts[p].workload;
-    info.config = sched::config_of(info.config, parts[p]);
-    Checker(trace, info, parts[p], rules, report).run(places, p);
+class TraceChecker::Impl {
+ public:
+  Impl(const trace::RunInfo &run, const RuleSet &rules) : parts_(parts_of(run.workload)), places_(places_in(parts_)) {
+    for (const ClusterPart &part : parts_) {
+      trace::RunInfo info = run;
+      info.workload = part.workload;
+      info.config = sched::config_of(info.config, part);
+      checkers_.emplace_back(std::move(info), part, rules, report_);
+    }
   }
-  return report;
+
+  void add(std::span<const JobEvent> events) {
+    for (const JobEvent &event : events) {
+      for (std::uint32_t p = 0; p < checkers_.size(); ++p) checkers_[p].add(count_, event, places_, p);
+      ++count_;
+    }
+  }
+
+  CheckReport finish(Time end, std::uint64_t lost_events) {
+    if (lost_events > 0) report_ = {};
+    checkers_.front().check_loss(lost_events);
+    if (lost_events > 0) return std::move(report_);
+    for (Checker &checker : checkers_) checker.end_of_trace(end);
+    return std::move(report_);
+  }
+
+ private:
+  std::vector<ClusterPart> parts_;
+  std::vector<TaskPlace> places_;
+  CheckReport report_;
+  std::deque<Checker> checkers_;  // by part; keeps its elements where they are
+  std::size_t count_ = 0;
+};
+
+TraceChecker::TraceChecker(const trace::RunInfo &run, const RuleSet &rules)
+    : impl_(std::make_unique<Impl>(run, rules)) {}
+TraceChecker::TraceChecker(TraceChecker &&) noexcept = default;
+TraceChecker::~TraceChecker() = default;
+
+void TraceChecker::add(std::span<const JobEvent> events) { impl_->add(events); }
+
+CheckReport TraceChecker::finish(Time end, std::uint64_t lost_events) { return impl_->finish(end, lost_events); }
+
+CheckReport check_trace(const trace::Trace &trace, const RuleSet &rules) {
+  TraceChecker checker(trace.info, rules);
+  if (trace.info.lost_events == 0) checker.add(trace.events);
+  return checker.finish(trace.info.end, trace.info.lost_events);
 }
 
 }  // namespace redag::metrics

@@ -4,6 +4,7 @@
 #include "redag_analysis/metrics/verdict.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -74,19 +75,24 @@ bool has_misses(const JobCounts &total, std::span<const DagSummary> dags) {
 }
 
 DeadlineVerdict deadline_verdict(const JobCounts &total, std::span<const DagSummary> dags) {
-  if (total.released == 0) return {false, false, "No job was released: there is no verdict."};
+  const auto verdict = [](bool is_judged, bool is_met, std::string headline, const std::string &rest) {
+    std::string text = headline + ": " + rest;
+    return DeadlineVerdict{is_judged, is_met, std::move(headline), std::move(text)};
+  };
+  if (total.released == 0) return verdict(false, false, "No job was released", "there is no verdict.");
   const std::uint64_t missed = total.missed();
   if (missed > 0) {
     const double share = static_cast<double>(missed) / static_cast<double>(total.released);
-    return {true, false,
-            fmt::format("{} of {} missed their deadline ({}): {}. By DAG: {}.{}", format_count(missed),
-                        jobs_text(total.released), format_percent(share), how_missed(total), by_dag(dags),
-                        late_end_to_end(dags))};
+    return verdict(true, false,
+                   fmt::format("{} of {} missed their deadline ({})", format_count(missed), jobs_text(total.released),
+                               format_percent(share)),
+                   fmt::format("{}. By DAG: {}.{}", how_missed(total), by_dag(dags), late_end_to_end(dags)));
   }
   const std::string open = total.in_flight > 0 ? fmt::format(" ({} still in progress)", total.in_flight) : "";
   const std::string jobs = fmt::format("{}{}, none late, none lost.", jobs_text(total.released), open);
-  if (!has_misses(total, dags)) return {true, true, "Every deadline was met: " + jobs};
-  return {true, false, "Every job met its own deadline: " + jobs + late_end_to_end(dags)};
+  if (!has_misses(total, dags)) return verdict(true, true, "Every deadline was met", jobs);
+  return verdict(true, false, "Every job met its own deadline, but end-to-end deadlines were missed",
+                 jobs + late_end_to_end(dags));
 }
 
 }  // namespace redag::metrics

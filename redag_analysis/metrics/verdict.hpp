@@ -16,7 +16,8 @@ namespace redag::metrics {
 struct DeadlineVerdict {
   bool is_judged = false;  // false: no job was released
   bool is_met = false;     // no job was late or lost, and no DAG exceeded its end-to-end deadline
-  std::string text;        // "1 of 23 326 jobs missed their deadline (0.0043 %): 1 late. By DAG: ...", with a period
+  std::string headline;    // "1 of 23 326 jobs missed their deadline (0.0043 %)"
+  std::string text;        // begins with the headline: "...: 1 late. By DAG: ...", with a period
 };
 
 /// Judges one run, or several whose counts were added.

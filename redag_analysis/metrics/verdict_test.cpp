@@ -39,6 +39,14 @@ TEST(DeadlineVerdict, OneMissOfManyIsAMiss) {
             "the other one.");
 }
 
+TEST(DeadlineVerdict, TheTextBeginsWithTheHeadline) {
+  const DeadlineVerdict missed = verdict({dag("control", 20000, 1)});
+  EXPECT_EQ(missed.headline, "1 of 20 000 jobs missed their deadline (0.005 %)");
+  for (const DeadlineVerdict &one : {missed, verdict({dag("control", 100, 0)}), verdict({})}) {
+    EXPECT_TRUE(one.text.starts_with(one.headline + ": ")) << one.text;
+  }
+}
+
 TEST(DeadlineVerdict, EveryDeadlineWasMet) {
   const std::vector<DagSummary> dags = {dag("control", 100, 0)};
   EXPECT_TRUE(verdict(dags).is_met);
@@ -54,8 +62,8 @@ TEST(DeadlineVerdict, ADagThatIsLateEndToEndDidNotMeetEveryDeadline) {
   EXPECT_TRUE(has_misses(total_of(dags), dags));
   EXPECT_EQ(
       verdict(dags).text,
-      "Every job met its own deadline: 1 000 jobs, none late, none lost. End to end, control exceeded its deadline "
-      "of 2ms 3 of 1 000 times.");
+      "Every job met its own deadline, but end-to-end deadlines were missed: 1 000 jobs, none late, none lost. End to "
+      "end, control exceeded its deadline of 2ms 3 of 1 000 times.");
 }
 
 TEST(DeadlineVerdict, LostJobsAreMissesAndThoseWithoutDataAreNot) {

@@ -8,7 +8,7 @@
 #include <tuple>
 #include <utility>
 
-#include "redag_analysis/metrics/summary.hpp"
+#include "redag_analysis/metrics/miss.hpp"
 #include "redag_analysis/metrics/why_path.hpp"
 
 namespace redag::metrics {
@@ -70,17 +70,12 @@ std::vector<Culprit> sorted(std::map<CulpritKey, Culprit> found) {
 }  // namespace
 
 Investigation::Investigation(const trace::Trace &trace, const KernelRecord *kernel)
-    : trace_(trace), links_(trace), is_sink_(sinks_of(trace.info.workload)) {
+    : trace_(trace), links_(trace), end_to_end_(end_to_end_deadlines(trace.info.workload)) {
   if (kernel != nullptr) kernel_.emplace(*kernel);
 }
 
 Miss Investigation::miss(std::size_t job) const {
-  return miss_of(jobs()[job], trace_.info.end, end_to_end_deadline(job));
-}
-
-Duration Investigation::end_to_end_deadline(std::size_t job) const {
-  const TaskId task = jobs()[job].task;
-  return is_sink_[task.value] ? trace_.info.workload.dags[links_.tasks()[task.value].dag.value].deadline : 0;
+  return miss_of(jobs()[job], trace_.info.end, end_to_end_[jobs()[job].task.value]);
 }
 
 std::optional<std::size_t> Investigation::find(const JobId &job) const {
@@ -103,8 +98,13 @@ Subject Investigation::subject_of(std::size_t job) const { return {job, miss(job
 double Investigation::closeness(const Subject &subject) const {
   const JobRecord &job = jobs()[subject.job];
   const Time begin = subject.end_to_end ? job.origin : job.release;
-  const Duration deadline = subject.end_to_end ? end_to_end_deadline(subject.job) : job.deadline - begin;
-  return static_cast<double>(links_.end_of(subject.job) - begin) / static_cast<double>(std::max<Duration>(1, deadline));
+  const Duration deadline = std::max<Duration>(1, deadline_of(subject));
+  return static_cast<double>(links_.end_of(subject.job) - begin) / static_cast<double>(deadline);
+}
+
+Duration Investigation::deadline_of(const Subject &subject) const {
+  const JobRecord &job = jobs()[subject.job];
+  return subject.end_to_end ? end_to_end_[job.task.value] : job.deadline - job.release;
 }
 
 std::vector<Subject> Investigation::misses() const {
@@ -148,6 +148,7 @@ std::vector<Explanation> Investigation::explain(std::span<const Subject> subject
     one.end_to_end = subject.end_to_end && one.job.origin != kNever;
     one.begin = one.end_to_end ? one.job.origin : one.job.release;
     one.end = std::max(one.begin, links_.end_of(subject.job));
+    one.deadline = deadline_of({subject.job, one.end_to_end});
     one.parts = WhyPath(trace_.info, links_, waits, kernel_ ? &*kernel_ : nullptr)
                     .parts_of(subject.job, one.begin, one.end, one.end_to_end);
     explanations.push_back(std::move(one));

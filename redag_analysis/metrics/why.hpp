@@ -34,9 +34,12 @@ struct Explanation {
   bool end_to_end = false;
   Time begin = 0;           // r, or the origin
   Time end = 0;             // f; of a lost job when it was lost, of a job in flight the end of the run
+  Duration deadline = 0;    // from `begin` on; 0: none, of a job without an end-to-end deadline
   std::vector<Part> parts;  // earliest first; their lengths sum to end - begin
 
   [[nodiscard]] Duration length() const { return end - begin; }
+  /// Above 0: late. Requires a deadline.
+  [[nodiscard]] Duration lateness() const { return length() - deadline; }
 };
 
 /// What one culprit cost the explained jobs.
@@ -75,12 +78,12 @@ class Investigation {
  private:
   [[nodiscard]] bool counts(std::size_t job) const;
   [[nodiscard]] Subject subject_of(std::size_t job) const;
-  [[nodiscard]] Duration end_to_end_deadline(std::size_t job) const;
+  [[nodiscard]] Duration deadline_of(const Subject &subject) const;
   [[nodiscard]] double closeness(const Subject &subject) const;
 
   const trace::Trace &trace_;
   JobLinks links_;
-  std::vector<bool> is_sink_;  // by TaskId
+  std::vector<Duration> end_to_end_;  // by TaskId: the deadline; 0: none
   std::optional<KernelView> kernel_;
 };
 

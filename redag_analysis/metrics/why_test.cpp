@@ -215,6 +215,19 @@ TEST(Why, WithoutAMissThereAreTheJobsClosestToTheirDeadlines) {
             "2000000 executed\n");
 }
 
+// One callback runs after the other, and max_active of the workload is no reason.
+TEST(Why, OtherExecutorsHaveNoMaxActiveAndNoOrder) {
+  Workload workload = make_workload({make_dag("d", {{"a", 10, 3}, {"b", 10, 2}})}, 1, PreemptionMode::None);
+  workload.dags[0].max_active = 1;
+  const trace::Trace trace = simulated(testing::run_info(workload, "ste"), 50 * kMillisecond);
+  Duration queued = 0;
+  for (const Explanation &one : explain_all(trace)) {
+    EXPECT_EQ(time_of(one, {Cause::MaxActive, Cause::Blocked, Cause::Demoted}), 0) << to_text(trace, one);
+    queued += time_of(one, {Cause::Queued});
+  }
+  EXPECT_GT(queued, 0);
+}
+
 // ---- what only threads show: a record of events by hand ----
 
 TraceBuilder on_threads() {

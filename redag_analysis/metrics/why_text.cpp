@@ -93,30 +93,20 @@ std::string describe(const Culprit &culprit, const Workload &workload) {
 std::string headline(const Explanation &explanation, const Workload &workload) {
   const JobRecord &job = explanation.job;
   const std::string name = job_name(workload, {job.task, job.number});
-  const Duration deadline = job.deadline - job.release;
-  const Duration end_to_end = workload.dags[flatten(workload)[job.task.value].dag.value].deadline;
   if (job.outcome == JobOutcome::Skipped || job.outcome == JobOutcome::Aborted) {
     return fmt::format("{} was {} ({}) {} after its release", name, to_string(job.outcome), to_string(job.reason),
                        humanize_duration(explanation.end - job.release));
   }
   const char *progress = job.outcome == JobOutcome::InFlight ? ", still in flight at the end of the run" : "";
-  if (explanation.end_to_end) {
-    if (end_to_end == 0) {
-      return fmt::format("{} answered {} after its data began{}", name, humanize_duration(explanation.length()),
-                         progress);
-    }
-    const Duration late = explanation.length() - end_to_end;
-    return fmt::format("{} {} the end-to-end deadline of {} {} {}{}", name, late > 0 ? "missed" : "met",
-                       humanize_duration(end_to_end), late > 0 ? "by" : "with",
-                       humanize_duration(late > 0 ? late : -late) + (late > 0 ? "" : " to spare"), progress);
+  if (explanation.deadline == 0) {
+    return fmt::format("{} answered {} after its data began{}", name, humanize_duration(explanation.length()),
+                       progress);
   }
-  const Duration late = explanation.length() - deadline;
-  if (late > 0) {
-    return fmt::format("{} missed its deadline of {} by {}{}", name, humanize_duration(deadline),
-                       humanize_duration(late), progress);
-  }
-  return fmt::format("{} met its deadline of {} with {} to spare{}", name, humanize_duration(deadline),
-                     humanize_duration(-late), progress);
+  const Duration late = explanation.lateness();
+  const std::string deadline = fmt::format("{} deadline of {}", explanation.end_to_end ? "the end-to-end" : "its",
+                                           humanize_duration(explanation.deadline));
+  if (late > 0) return fmt::format("{} missed {} by {}{}", name, deadline, humanize_duration(late), progress);
+  return fmt::format("{} met {} with {} to spare{}", name, deadline, humanize_duration(-late), progress);
 }
 
 }  // namespace redag::metrics

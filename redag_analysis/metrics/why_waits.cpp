@@ -8,30 +8,29 @@
 
 #include "redag/model/clusters.hpp"
 #include "redag/sched/cluster_config.hpp"
-#include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/replay.hpp"
+#include "redag_analysis/metrics/trace_checker.hpp"
 
 namespace redag::metrics {
 namespace {
 
 using State = LiveJob::State;
 
-// Other executors have no max_active and no bound on the jobs of a task. Their order of jobs is not that of the policy,
-// and a callback of theirs is never called more or less urgent here.
-bool follows_the_model(const trace::RunInfo &info) {
-  const executors::ExecutorKind *kind = executors::find_executor(info.executor);
-  return info.driver != trace::Driver::RosNodes && (kind == nullptr || kind->ours);
+// Other executors have no max_active: it must not explain a wait of theirs.
+ClusterPart as_followed(ClusterPart part, const RuleSet &rules) {
+  if (rules.contains(Rule::MaxActive)) return part;
+  for (Dag &dag : part.workload.dags) dag.max_active = 0;
+  return part;
 }
 
 // Follows one cluster, whose ids count from 0.
 class ClusterWaits {
  public:
   ClusterWaits(const ClusterPart &part, const trace::RunInfo &info, const JobLinks &links)
-      : part_(part),
+      : rules_(rules_for(info)),
+        part_(as_followed(part, rules_)),
         config_(sched::config_of(info.config, part_)),
         replay_(part_.workload, config_),
-        priorities_(sched::assign_priorities(part_.workload.dags, config_.policy, config_.ties)),
-        ours_(follows_the_model(info)),
         links_(links) {}
 
   void add(JobEvent event, const std::vector<bool> &chosen, std::vector<std::vector<Wait>> &waits) {
@@ -106,28 +105,24 @@ class ClusterWaits {
     return first;
   }
 
-  // The order of the checks is that of docs/model.md, "Deferral".
   [[nodiscard]] Wait not_started(const LiveJob &job) const {
-    const Task &task = replay_.task(job.task);
-    if (replay_.task_active(job.task) >= task.concurrency) {
+    const Replay::Gate gate = replay_.gate(job.task);
+    if (gate == Replay::Gate::Task) {
       return by(Cause::OwnTask, holder([&](TaskId other) { return other == job.task; }));
     }
     for (const LiveJob &other : replay_.jobs_of(job.task)) {
       if (other.number == job.number) break;
       if (other.state == State::Ready) return by(Cause::OwnTask, &other);
     }
-    const DagId dag = replay_.dag_of(job.task);
-    const std::uint32_t most = part_.workload.dags[dag.value].max_active;
-    if (ours_ && most > 0 && replay_.active(dag) >= most) {
+    if (gate == Replay::Gate::Dag) {
+      const DagId dag = replay_.dag_of(job.task);
       return by(Cause::MaxActive, holder([&](TaskId other) { return replay_.dag_of(other) == dag; }));
     }
-    const std::uint32_t group = replay_.group_of(job.task);
-    if (group != Replay::kNoGroup && replay_.group_active(group) > 0) {
+    if (gate == Replay::Gate::Group) {
+      const std::uint32_t group = replay_.group_of(job.task);
       return by(Cause::Group, holder([&](TaskId other) { return replay_.group_of(other) == group; }));
     }
-    if (config_.max_started > 0 && replay_.started() >= config_.max_started) {
-      return by(Cause::NoThread, holder([](TaskId) { return true; }));
-    }
+    if (replay_.at_thread_limit()) return by(Cause::NoThread, holder([](TaskId) { return true; }));
     return occupied(job, Cause::Queued);
   }
 
@@ -148,28 +143,18 @@ class ClusterWaits {
     return compared(job, least, usual);
   }
 
+  // Jobs of other executors have no order here: none of them is called more or less urgent.
   [[nodiscard]] Wait compared(const LiveJob &job, const LiveJob *other, Cause usual) const {
     if (other == nullptr) return by(Cause::Unknown, nullptr);
-    if (!ours_) return by(usual, other);
-    if (is_demoted(job) && !is_demoted(*other) && would_outrank(job, *other)) return by(Cause::Demoted, other);
+    if (!rules_.contains(Rule::Priority)) return by(usual, other);
+    if (replay_.is_passed_by_demotion(job, *other)) return by(Cause::Demoted, other);
     return by(job.own.key < other->own.key ? Cause::Blocked : usual, other);
   }
 
-  // By what the policy says without a demotion.
-  [[nodiscard]] bool would_outrank(const LiveJob &job, const LiveJob &other) const {
-    if (config_.policy == PolicyKind::Edf) return job.deadline <= other.deadline;
-    return is_static(config_.policy) && priorities_[job.task.value].tier <= priorities_[other.task.value].tier;
-  }
-
-  [[nodiscard]] bool is_demoted(const LiveJob &job) const {
-    return job.demoted || (replay_.high_mode() && replay_.is_degradable(job.task));
-  }
-
+  const RuleSet rules_;
   const ClusterPart part_;
   const sched::Config config_;
   Replay replay_;
-  std::vector<sched::Priority> priorities_;
-  bool ours_;
   const JobLinks &links_;
   std::vector<Followed> followed_;
   Time time_ = 0;

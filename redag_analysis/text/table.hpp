@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A table for people, with aligned columns that fit the terminal. If they do not fit, text columns are cut first. Then
-// the least important columns are left out, and a line below names them.
+// A table for people, with aligned columns that fit the terminal. If they do not fit, prose wraps at words. Then the
+// least important columns are left out, and a line below names them. Names are cut last: text columns that no number
+// exceeds in importance.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +18,7 @@ struct Column {
   std::string title;
   bool number = false;      // right-aligned, never cut
   unsigned importance = 0;  // columns of lower importance are left out first; among equals the last
-  bool whole = false;       // never cut, although it is text
+  bool prose = false;       // text that wraps at words
 };
 
 struct Cell {
@@ -36,10 +37,7 @@ class Table {
   [[nodiscard]] std::string render(std::size_t width, bool colour) const;
 
  private:
-  [[nodiscard]] std::vector<std::size_t> fit(std::size_t width, std::vector<std::size_t> &shown) const;
-
-  /// Returns the least width at which cells that differ remain different.
-  [[nodiscard]] std::size_t shortest_cut(std::size_t column) const;
+  class Layout;
 
   std::vector<Column> columns_;
   std::vector<std::vector<Cell>> rows_;

@@ -30,8 +30,15 @@ std::string tinted(std::string_view text, Tint tint, bool colour) {
 }
 
 std::size_t display_width(std::string_view text) {
-  const auto starts_character = [](char c) { return (static_cast<unsigned char>(c) & 0xc0U) != 0x80U; };
-  return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), starts_character));
+  std::size_t columns = 0;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text.substr(i).starts_with("\033[")) {
+      i = std::min(text.find('m', i), text.size());  // tinted() writes no other codes
+      continue;
+    }
+    if ((static_cast<unsigned char>(text[i]) & 0xc0U) != 0x80U) ++columns;
+  }
+  return columns;
 }
 
 std::string cut(std::string_view text, std::size_t width) {
