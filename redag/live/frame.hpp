@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,7 +17,11 @@ namespace redag::live {
 struct DagFrame {
   std::string name;
   std::uint32_t max_active = 0;  // 0: no bound
-  page::Figures figures{};  // sums; response times only of a DAG with a single task: those of several are not mixed
+  page::Figures figures{};       // sums; response times are end to end, each that of the sink with the worst one
+  Duration deadline = 0;         // end to end; 0: none
+  std::uint64_t late = 0;        // answers of sinks beyond it
+  std::uint64_t recent_late = 0;
+  page::Spread spread{};  // of the sink with the longest response p99
 };
 
 struct TaskFrame {
@@ -26,6 +31,15 @@ struct TaskFrame {
   Duration deadline = 0;  // 0: none
   Duration bound = 0;     // 0: not known
   page::Figures figures{};
+  page::Spread spread{};
+};
+
+/// A worker thread.
+struct ThreadFrame {
+  std::uint32_t index = 0;
+  Duration used = 0;  // processor time of the jobs that ended on it
+  Duration recent_used = 0;
+  std::optional<std::uint32_t> task = {};  // index of the task whose job it runs
 };
 
 struct Frame {
@@ -44,7 +58,9 @@ struct Frame {
   std::uint64_t left_out = 0;
   std::string alert;  // what stops the executor now, such as a deadlock; empty: nothing
   std::vector<DagFrame> dags;
-  std::vector<TaskFrame> tasks;  // ordered by DAG
+  std::vector<TaskFrame> tasks;      // ordered by DAG
+  std::vector<ThreadFrame> threads;  // by index; the busiest ones if there are too many
+  std::uint32_t threads_in_all = 0;
 };
 
 }  // namespace redag::live

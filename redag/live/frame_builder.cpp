@@ -4,6 +4,7 @@
 #include "redag/live/frame_builder.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "redag/base/check.hpp"
 
@@ -17,15 +18,6 @@ void set_response(page::Figures &figures, const HistogramCounts &all, const Hist
   figures.recent_p50 = recent.percentile(0.5);
   figures.recent_p99 = recent.percentile(0.99);
   figures.recent_max = recent.percentile(1.0);
-}
-
-void copy_response(const page::Figures &from, page::Figures &to) {
-  to.response_p50 = from.response_p50;
-  to.response_p99 = from.response_p99;
-  to.response_max = from.response_max;
-  to.recent_p50 = from.recent_p50;
-  to.recent_p99 = from.recent_p99;
-  to.recent_max = from.recent_max;
 }
 
 void add(page::Figures &sum, const page::Figures &task) {
@@ -46,6 +38,39 @@ void add(page::Figures &sum, const page::Figures &task) {
   sum.waiting += task.waiting;
 }
 
+void set_counts(std::uint32_t (&counts)[page::kClasses], const HistogramCounts &histogram) {
+  // Half an octave has four buckets of the histogram, in which 1024 ns begins the sixteenth half.
+  constexpr std::size_t kHalf = std::size_t{1} << (HistogramCounts::kBits - 1);
+  constexpr std::size_t kFirst = 16 * kHalf;
+  const auto clamped = [](std::uint64_t count) {
+    return static_cast<std::uint32_t>(std::min<std::uint64_t>(count, ~std::uint32_t{0}));
+  };
+  for (std::size_t i = 0; i < page::kClasses; ++i) {
+    const std::size_t first = i == 0 ? 0 : kFirst + i * kHalf;
+    const std::size_t last = i + 1 == page::kClasses ? HistogramCounts::kBuckets : kFirst + (i + 1) * kHalf;
+    counts[i] = clamped(histogram.count_in(first, last));
+  }
+}
+
+void set_spread(page::Spread &spread, const HistogramCounts &all, const HistogramCounts &recent) {
+  set_counts(spread.all, all);
+  set_counts(spread.recent, recent);
+}
+
+/// Adds the answers of a sink to its DAG's row. Those of several sinks are not mixed.
+void add_answers(DagFrame &dag, const HistogramCounts &all, const HistogramCounts &recent) {
+  page::Figures of_sink{};
+  set_response(of_sink, all, recent);
+  page::Figures &worst = dag.figures;
+  if (of_sink.response_p99 > worst.response_p99) set_spread(dag.spread, all, recent);
+  worst.response_p50 = std::max(worst.response_p50, of_sink.response_p50);
+  worst.response_p99 = std::max(worst.response_p99, of_sink.response_p99);
+  worst.response_max = std::max(worst.response_max, of_sink.response_max);
+  worst.recent_p50 = std::max(worst.recent_p50, of_sink.recent_p50);
+  worst.recent_p99 = std::max(worst.recent_p99, of_sink.recent_p99);
+  worst.recent_max = std::max(worst.recent_max, of_sink.recent_max);
+}
+
 }  // namespace
 
 FrameBuilder::FrameBuilder(Time began, Duration window)
@@ -60,14 +85,27 @@ void FrameBuilder::build(const Sample &sample, Time now, Frame &frame) {
   frame.alert = sample.alert;
   frame.dags.clear();
   frame.tasks.clear();
-  for (const DagSample &dag : sample.dags) frame.dags.push_back(DagFrame{dag.name, dag.max_active, {}});
-  std::vector<std::size_t> tasks_of(sample.dags.size());
+  for (const DagSample &dag : sample.dags) {
+    frame.dags.push_back(DagFrame{.name = dag.name, .max_active = dag.max_active, .deadline = dag.deadline});
+  }
+  build_tasks(sample, turns, frame);
+  build_threads(sample, turns, frame);
+  if (turns) {
+    base_at_ = next_at_;
+    next_at_ = now;
+  }
+  std::erase_if(histories_, [this](const auto &entry) { return entry.second.seen != builds_; });
+}
 
+void FrameBuilder::build_tasks(const Sample &sample, bool turns, Frame &frame) {
+  std::vector<std::pair<TaskFrame, std::uint64_t>> rows;  // with their keys
   for (const TaskSample &task : sample.tasks) {
     REDAG_CHECK(task.dag < sample.dags.size(), "a task of a DAG that is not there");
+    DagFrame &dag = frame.dags[task.dag];
     History &history = histories_[task.key];
-    Mark current{task.finished, task.misses, task.preemptions, task.cpu, {}};
+    Mark current{task.finished, task.misses, task.preemptions, task.cpu, task.late_end_to_end, {}, {}};
     if (task.response) current.response = task.response->counts();
+    if (task.end_to_end) current.end_to_end = task.end_to_end->counts();
     const bool is_another = history.histogram != task.response || task.finished < history.next.finished;
     if (is_another) history = History{};
     history.histogram = task.response;
@@ -75,28 +113,55 @@ void FrameBuilder::build(const Sample &sample, Time now, Frame &frame) {
 
     HistogramCounts recent = current.response;
     recent -= history.base.response;
-    TaskFrame row{task.name,     task.dag,   task.period,
-                  task.deadline, task.bound, figures_of(task, current, recent, history.base)};
-    add(frame.dags[task.dag].figures, row.figures);
-    ++tasks_of[task.dag];
-    frame.tasks.push_back(std::move(row));
+    TaskFrame row{.name = task.name,
+                  .dag = task.dag,
+                  .period = task.period,
+                  .deadline = task.deadline,
+                  .bound = task.bound,
+                  .figures = figures_of(task, current, recent, history.base)};
+    set_spread(row.spread, current.response, recent);
+    add(dag.figures, row.figures);
+    if (task.end_to_end) {
+      HistogramCounts recent_answers = current.end_to_end;
+      recent_answers -= history.base.end_to_end;
+      add_answers(dag, current.end_to_end, recent_answers);
+      dag.late += task.late_end_to_end;
+      dag.recent_late += task.late_end_to_end - history.base.late_end_to_end;
+    }
+    rows.emplace_back(std::move(row), task.key);
     if (turns) {
       history.base = history.next;
       history.next = current;
     }
   }
-  // The response of a DAG is end to end, which its tasks' responses do not give. Only that of a single task is also the
-  // DAG's.
-  for (const TaskFrame &task : frame.tasks) {
-    if (tasks_of[task.dag] == 1) copy_response(task.figures, frame.dags[task.dag].figures);
+  std::stable_sort(rows.begin(), rows.end(), [](const auto &a, const auto &b) { return a.first.dag < b.first.dag; });
+  row_of_.clear();
+  for (auto &[row, key] : rows) {
+    row_of_.emplace(key, static_cast<std::uint32_t>(frame.tasks.size()));
+    frame.tasks.push_back(std::move(row));
   }
-  std::stable_sort(frame.tasks.begin(), frame.tasks.end(),
-                   [](const TaskFrame &a, const TaskFrame &b) { return a.dag < b.dag; });
-  if (turns) {
-    base_at_ = next_at_;
-    next_at_ = now;
+}
+
+void FrameBuilder::build_threads(const Sample &sample, bool turns, Frame &frame) {
+  frame.threads.clear();
+  frame.threads_in_all = static_cast<std::uint32_t>(sample.threads.size());
+  threads_.resize(sample.threads.size());
+  for (std::size_t i = 0; i < sample.threads.size(); ++i) {
+    const ThreadSample &thread = sample.threads[i];
+    ThreadHistory &history = threads_[i];
+    const auto row = thread.task ? row_of_.find(*thread.task) : row_of_.end();
+    frame.threads.push_back({.index = static_cast<std::uint32_t>(i),
+                             .used = thread.used,
+                             .recent_used = thread.used - history.base,
+                             .task = row == row_of_.end() ? std::nullopt : std::optional(row->second)});
+    if (turns) history = {history.next, thread.used};
   }
-  std::erase_if(histories_, [this](const auto &entry) { return entry.second.seen != builds_; });
+  if (frame.threads.size() <= page::kThreads) return;
+  const auto busier = [](const ThreadFrame &a, const ThreadFrame &b) { return a.recent_used > b.recent_used; };
+  std::stable_sort(frame.threads.begin(), frame.threads.end(), busier);
+  frame.threads.resize(page::kThreads);
+  std::sort(frame.threads.begin(), frame.threads.end(),
+            [](const ThreadFrame &a, const ThreadFrame &b) { return a.index < b.index; });
 }
 
 page::Figures FrameBuilder::figures_of(const TaskSample &task, const Mark &now, const HistogramCounts &recent,

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,7 @@ namespace redag::live {
 struct DagSample {
   std::string name;
   std::uint32_t max_active = 0;  // 0: no bound
+  Duration deadline = 0;         // end to end; 0: none
 };
 
 /// The state of a task at some moment. Counters start when the task is added.
@@ -41,12 +43,22 @@ struct TaskSample {
   std::uint32_t ready = 0;
   std::uint32_t waiting = 0;
   std::shared_ptr<const Histogram> response;  // null: not measured
+  // From the release of the data's source. Can be `response` itself. Null: not measured, or tasks of its DAG follow.
+  std::shared_ptr<const Histogram> end_to_end;
+  std::uint64_t late_end_to_end = 0;  // beyond the DAG's deadline
+};
+
+/// A worker thread.
+struct ThreadSample {
+  Duration used = 0;                       // processor time of the jobs that ended on it
+  std::optional<std::uint64_t> task = {};  // key of the task whose job it runs
 };
 
 struct Sample {
   std::vector<DagSample> dags;
-  std::vector<TaskSample> tasks;  // in any order; `dag` must be among the DAGs
-  std::string alert{};            // see Frame
+  std::vector<TaskSample> tasks;        // in any order; `dag` must be among the DAGs
+  std::vector<ThreadSample> threads{};  // the same ones each time
+  std::string alert{};                  // see Frame
 };
 
 class FrameBuilder {
@@ -63,7 +75,9 @@ class FrameBuilder {
     std::uint64_t misses = 0;
     std::uint64_t preemptions = 0;
     Duration cpu = 0;
+    std::uint64_t late_end_to_end = 0;
     HistogramCounts response;
+    HistogramCounts end_to_end;
   };
   struct History {
     std::shared_ptr<const Histogram> histogram;  // kept alive: a reused key has another histogram
@@ -71,6 +85,13 @@ class FrameBuilder {
     Mark next;                                   // the next base
     std::uint64_t seen = 0;
   };
+  struct ThreadHistory {
+    Duration base = 0;
+    Duration next = 0;
+  };
+
+  void build_tasks(const Sample &sample, bool turns, Frame &frame);
+  void build_threads(const Sample &sample, bool turns, Frame &frame);
 
   static page::Figures figures_of(const TaskSample &task, const Mark &now, const HistogramCounts &recent,
                                   const Mark &base);
@@ -80,7 +101,9 @@ class FrameBuilder {
   Time base_at_;
   Time next_at_;
   std::uint64_t builds_ = 0;
-  std::map<std::uint64_t, History> histories_;  // by TaskSample::key
+  std::map<std::uint64_t, History> histories_;     // by TaskSample::key
+  std::map<std::uint64_t, std::uint32_t> row_of_;  // of the tasks of this frame, by key
+  std::vector<ThreadHistory> threads_;             // as Sample::threads
 };
 
 }  // namespace redag::live

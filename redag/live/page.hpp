@@ -67,11 +67,29 @@ struct Figures {
   std::uint32_t reserved;
 };
 
+/// How often response times occurred: counts of classes of time. There are two classes an octave (see least_in()). The
+/// first class takes shorter times as well, and the last one longer times.
+inline constexpr std::size_t kClasses = 48;
+struct Spread {
+  std::uint32_t recent[kClasses];
+  std::uint32_t all[kClasses];
+};
+
+/// Returns the least response time of a class, in nanoseconds: 1024, 1536, 2048, 3072, ...
+[[nodiscard]] constexpr std::int64_t least_in(std::size_t index) noexcept {
+  return (index % 2 == 0 ? std::int64_t{1024} : std::int64_t{1536}) << (index / 2);
+}
+
 struct DagRow {
   char name[kNameSize];
   std::uint32_t max_active;  // 0: no bound
   std::uint32_t reserved;
-  Figures figures;
+  Figures figures;  // its response times are end to end
+  // Appended; see kLeastDagRow.
+  std::int64_t deadline;  // end to end; 0: none
+  std::uint64_t late;     // answers of sinks beyond it
+  std::uint64_t recent_late;
+  Spread spread;
 };
 
 struct TaskRow {
@@ -82,7 +100,18 @@ struct TaskRow {
   std::int64_t deadline;  // relative; 0: none
   std::int64_t bound;     // proven bound on the response time; 0: not known
   Figures figures;
+  Spread spread;  // appended; see kLeastTaskRow
 };
+
+/// A worker thread. Those with the most recent work, ordered by number, if there are more than kThreads.
+struct ThreadRow {
+  std::int64_t used;  // processor time of the jobs that ended on it
+  std::int64_t recent_used;
+  std::uint32_t index;
+  std::uint32_t task;  // index among the task rows of the job it runs; kNoTask: none
+};
+inline constexpr std::size_t kThreads = 64;
+inline constexpr std::uint32_t kNoTask = 0xffffffff;
 
 /// At the start of a slot. `dags` rows of DAGs follow, then `tasks` rows of tasks.
 struct FrameHeader {
@@ -103,26 +132,34 @@ struct FrameHeader {
   char driver[16];       // "threads", "ros"
   char preemption[16];   // "os", ...
   char policy[32];
-  char alert[kAlertSize];  // what stops the executor now, such as a deadlock; empty: nothing. Pages of early programs
-                           // end before it, see kLeastFrameHeader.
+  // Appended; see kLeastFrameHeader.
+  char alert[kAlertSize];        // what stops the executor now, such as a deadlock; empty: nothing
+  std::uint32_t threads;         // rows below that are used
+  std::uint32_t threads_in_all;  // of the executor
+  ThreadRow thread[kThreads];
 };
 
-/// Size of a FrameHeader without the fields that were appended to version 1. A reader takes those as zero.
+/// Sizes without the fields that were appended to version 1. A reader takes those as zero where a page lacks them.
 inline constexpr std::size_t kLeastFrameHeader = 272;
+inline constexpr std::size_t kLeastDagRow = 264;
+inline constexpr std::size_t kLeastTaskRow = 288;
 
 template <class Row>
 inline constexpr bool kIsPlain = std::is_trivially_copyable_v<Row>&& std::is_standard_layout_v<Row> &&
                                  sizeof(Row) % 8 == 0;
 static_assert(kIsPlain<Header> && kIsPlain<Figures> && kIsPlain<DagRow> && kIsPlain<TaskRow> && kIsPlain<FrameHeader>);
+static_assert(kIsPlain<Spread> && kIsPlain<ThreadRow>);
 
 // Sizes and offsets as in docs/live_page.md.
 static_assert(sizeof(Header) == 88 && offsetof(Header, page_size) == 32 && offsetof(Header, pid) == 56);
 static_assert(offsetof(Header, sequence) == 80);
 static_assert(sizeof(Figures) == 160 && offsetof(Figures, response_p50) == 64 && offsetof(Figures, active) == 144);
-static_assert(sizeof(DagRow) == 264 && offsetof(DagRow, figures) == 104);
-static_assert(sizeof(TaskRow) == 288 && offsetof(TaskRow, period) == 104 && offsetof(TaskRow, figures) == 128);
-static_assert(sizeof(FrameHeader) == 528 && offsetof(FrameHeader, name) == 80);
-static_assert(offsetof(FrameHeader, alert) == kLeastFrameHeader);
+static_assert(sizeof(Spread) == 384 && sizeof(ThreadRow) == 24);
+static_assert(sizeof(DagRow) == 672 && offsetof(DagRow, figures) == 104 && offsetof(DagRow, deadline) == kLeastDagRow);
+static_assert(sizeof(TaskRow) == 672 && offsetof(TaskRow, period) == 104 && offsetof(TaskRow, figures) == 128);
+static_assert(offsetof(TaskRow, spread) == kLeastTaskRow);
+static_assert(sizeof(FrameHeader) == 2072 && offsetof(FrameHeader, name) == 80);
+static_assert(offsetof(FrameHeader, alert) == kLeastFrameHeader && offsetof(FrameHeader, thread) == 536);
 
 /// FNV-1a over the 8-byte words of `bytes`, whose size is a multiple of 8.
 [[nodiscard]] inline std::uint64_t checksum(std::span<const std::byte> bytes) noexcept {

@@ -90,12 +90,101 @@ TEST(FrameBuilder, ADagIsTheSumOfItsTasks) {
   EXPECT_EQ(frame.tasks[2].name, "t2");
 }
 
+TEST(FrameBuilder, ADagAnswersEndToEndByItsWorstSink) {
+  FrameBuilder builder(0, kSecond);
+  const auto histogram = [](Duration value, int count) {
+    auto made = std::make_shared<Histogram>();
+    for (int i = 0; i < count; ++i) made->add(value);
+    return made;
+  };
+  Sample sample{{{"a", 0, 3 * kMillisecond}},
+                {task_of(1, 0, 9, histogram(9 * kSecond, 9)), task_of(2, 0, 100, histogram(10, 100)),
+                 task_of(3, 0, 5, histogram(20, 5))}};
+  const auto often = histogram(kMillisecond, 99);
+  often->add(kSecond);
+  sample.tasks[1].end_to_end = often;
+  sample.tasks[1].late_end_to_end = 1;
+  const auto rare = histogram(4 * kMillisecond, 5);
+  sample.tasks[2].end_to_end = rare;
+  sample.tasks[2].late_end_to_end = 5;
+  Frame frame;
+  builder.build(sample, 2 * kSecond, frame);
+  const DagFrame &dag = frame.dags[0];
+  EXPECT_EQ(dag.figures.response_max, kSecond) << "of the first sink";
+  EXPECT_EQ(dag.figures.response_p99, 4 * kMillisecond) << "of the second sink";
+  EXPECT_EQ(dag.figures.recent_p50, 4 * kMillisecond);
+  EXPECT_EQ(dag.deadline, 3 * kMillisecond);
+  EXPECT_EQ(dag.late, 6U);
+  EXPECT_EQ(dag.recent_late, 6U);
+  for (int second = 3; second <= 6; ++second) builder.build(sample, second * kSecond, frame);
+  EXPECT_EQ(dag.late, 6U);
+  EXPECT_EQ(dag.recent_late, 0U);
+  EXPECT_EQ(dag.figures.recent_max, 0);
+  EXPECT_EQ(dag.figures.response_max, kSecond);
+}
+
+TEST(FrameBuilder, ASpreadCountsClassesOfTime) {
+  FrameBuilder builder(0, kSecond);
+  const auto response = std::make_shared<Histogram>();
+  const std::vector<std::pair<Duration, std::size_t>> classes{
+      {0, 0},    {1535, 0},       {1536, 1},     {2047, 1},          {2048, 2},
+      {3072, 3}, {1'000'000, 19}, {kSecond, 39}, {12 * kSecond, 46}, {1000 * kSecond, 47}};
+  std::vector<std::uint32_t> expected(page::kClasses);
+  for (const auto &[time, index] : classes) {
+    response->add(time);
+    ++expected[index];
+    EXPECT_LE(index == 0 ? 0 : page::least_in(index), time);
+    if (index + 1 < page::kClasses) {
+      EXPECT_GT(page::least_in(index + 1), time);
+    }
+  }
+  Frame frame;
+  builder.build({{{"a", 0}}, {task_of(1, 0, 10, response)}}, kSecond / 2, frame);
+  EXPECT_THAT(frame.tasks[0].spread.all, ::testing::ElementsAreArray(expected));
+  EXPECT_THAT(frame.tasks[0].spread.recent, ::testing::ElementsAreArray(expected));
+  for (int second = 1; second <= 3; ++second) {
+    builder.build({{{"a", 0}}, {task_of(1, 0, 10, response)}}, second * kSecond, frame);
+  }
+  EXPECT_THAT(frame.tasks[0].spread.all, ::testing::ElementsAreArray(expected));
+  EXPECT_THAT(frame.tasks[0].spread.recent, ::testing::Each(0U));
+}
+
+TEST(FrameBuilder, ThreadsNameTheTaskThatTheyRun) {
+  FrameBuilder builder(0, kSecond);
+  Sample sample{{{"a", 0}, {"b", 0}}, {task_of(7, 1, 0), task_of(8, 0, 0)}};
+  sample.threads = {{kSecond, 7}, {0, {}}, {5, 99}};
+  Frame frame;
+  builder.build(sample, kSecond, frame);
+  builder.build(sample, 2 * kSecond, frame);
+  sample.threads[0].used += 30;
+  builder.build(sample, 3 * kSecond, frame);
+  EXPECT_EQ(frame.threads_in_all, 3U);
+  ASSERT_THAT(frame.threads, SizeIs(3));
+  EXPECT_EQ(frame.threads[0].task, 1U) << "rows are ordered by DAG";
+  EXPECT_EQ(frame.threads[0].used, kSecond + 30);
+  EXPECT_EQ(frame.threads[0].recent_used, 30);
+  EXPECT_EQ(frame.threads[1].task, std::nullopt);
+  EXPECT_EQ(frame.threads[2].task, std::nullopt) << "a task that is no longer there";
+
+  // Of too many threads, those that did most lately.
+  sample.threads.assign(100, {});
+  builder.build(sample, 4 * kSecond, frame);
+  for (std::size_t i = 20; i < 100; ++i) sample.threads[i].used = static_cast<Duration>(i);
+  builder.build(sample, 4 * kSecond + 1, frame);
+  EXPECT_EQ(frame.threads_in_all, 100U);
+  ASSERT_THAT(frame.threads, SizeIs(page::kThreads));
+  EXPECT_EQ(frame.threads.front().index, 36U);
+  EXPECT_EQ(frame.threads.back().index, 99U);
+}
+
 TEST(FrameBuilder, TheResponseOfASingleTaskIsItsDags) {
   FrameBuilder builder(0, kSecond);
   const auto slow = std::make_shared<Histogram>();
   slow->add(kSecond);
   Frame frame;
-  builder.build({{{"a", 0}}, {task_of(1, 0, 1, slow)}}, kSecond / 2, frame);
+  TaskSample task = task_of(1, 0, 1, slow);
+  task.end_to_end = slow;
+  builder.build({{{"a", 0}}, {task}}, kSecond / 2, frame);
   EXPECT_EQ(frame.dags[0].figures.response_max, kSecond);
   EXPECT_EQ(frame.dags[0].figures.response_p99, frame.tasks[0].figures.response_p99);
   EXPECT_EQ(frame.dags[0].figures.recent_max, frame.tasks[0].figures.recent_max);

@@ -151,8 +151,8 @@ Result<Header> read_header(const File &file, const std::string &path, std::uint6
   };
   const bool sound =
       header.page_size <= kMostBytes && header.page_size <= file_size && header.header_size >= sizeof(Header) &&
-      is_row(header.frame_header_size, page::kLeastFrameHeader) && is_row(header.dag_row_size, sizeof(DagRow)) &&
-      is_row(header.task_row_size, sizeof(TaskRow)) && header.slot_offset <= header.page_size &&
+      is_row(header.frame_header_size, page::kLeastFrameHeader) && is_row(header.dag_row_size, page::kLeastDagRow) &&
+      is_row(header.task_row_size, page::kLeastTaskRow) && header.slot_offset <= header.page_size &&
       header.slot_size % 8 == 0 && header.slot_size >= header.frame_header_size &&
       header.slot_size <= (header.page_size - header.slot_offset) / 2;
   if (!sound) return damaged(path, "its sizes do not match");
@@ -195,21 +195,41 @@ Result<Frame> decode(const std::string &path, const Header &header, const FrameH
   frame.publisher_cpu = head.publisher_cpu;
   frame.left_out = head.left_out;
   frame.alert = get_name(head.alert);
-  bool plausible = is_duration(head.began) && is_duration(head.published) && is_duration(head.interval) &&
-                   is_duration(head.window) && is_duration(head.publisher_cpu);
+  frame.threads_in_all = head.threads_in_all;
+  bool plausible = head.threads <= page::kThreads && is_duration(head.began) && is_duration(head.published) &&
+                   is_duration(head.interval) && is_duration(head.window) && is_duration(head.publisher_cpu);
+  for (std::uint32_t i = 0; plausible && i < head.threads; ++i) {
+    const page::ThreadRow &row = head.thread[i];
+    plausible =
+        is_duration(row.used) && is_duration(row.recent_used) && (row.task < head.tasks || row.task == page::kNoTask);
+    const auto task = row.task == page::kNoTask ? std::nullopt : std::optional(row.task);
+    frame.threads.push_back({.index = row.index, .used = row.used, .recent_used = row.recent_used, .task = task});
+  }
   const std::byte *at = bytes.data() + header.frame_header_size;
   for (std::uint32_t d = 0; d < head.dags; ++d, at += header.dag_row_size) {
     DagRow row{};
-    std::memcpy(&row, at, sizeof(row));
-    plausible = plausible && is_plausible(row.figures);
-    frame.dags.push_back(DagFrame{get_name(row.name), row.max_active, row.figures});
+    std::memcpy(&row, at, std::min<std::size_t>(sizeof(row), header.dag_row_size));
+    plausible = plausible && is_plausible(row.figures) && is_duration(row.deadline);
+    frame.dags.push_back(DagFrame{.name = get_name(row.name),
+                                  .max_active = row.max_active,
+                                  .figures = row.figures,
+                                  .deadline = row.deadline,
+                                  .late = row.late,
+                                  .recent_late = row.recent_late,
+                                  .spread = row.spread});
   }
   for (std::uint32_t t = 0; t < head.tasks; ++t, at += header.task_row_size) {
     TaskRow row{};
-    std::memcpy(&row, at, sizeof(row));
+    std::memcpy(&row, at, std::min<std::size_t>(sizeof(row), header.task_row_size));
     plausible = plausible && row.dag < head.dags && is_duration(row.period) && is_duration(row.deadline) &&
                 is_duration(row.bound) && is_plausible(row.figures);
-    frame.tasks.push_back(TaskFrame{get_name(row.name), row.dag, row.period, row.deadline, row.bound, row.figures});
+    frame.tasks.push_back(TaskFrame{.name = get_name(row.name),
+                                    .dag = row.dag,
+                                    .period = row.period,
+                                    .deadline = row.deadline,
+                                    .bound = row.bound,
+                                    .figures = row.figures,
+                                    .spread = row.spread});
   }
   if (!plausible) return damaged(path, "its figures are out of range");
   return frame;

@@ -86,14 +86,22 @@ Frame make_frame(std::size_t dags = 2, std::size_t tasks_each = 3, std::uint64_t
   frame.interval = kSecond / 2;
   frame.window = 2 * kSecond;
   frame.publisher_cpu = 12'345;
+  frame.threads_in_all = 5;
+  frame.threads = {{.index = 1, .used = 100, .recent_used = 10, .task = 3}, {.index = 4}};
   for (std::size_t d = 0; d < dags; ++d) {
     frame.dags.push_back(DagFrame{"dag" + std::to_string(d), static_cast<std::uint32_t>(d), {}});
     frame.dags.back().figures.released = count;
+    frame.dags.back().deadline = static_cast<Duration>(d) * kSecond;
+    frame.dags.back().late = 9;
+    frame.dags.back().recent_late = 2;
+    frame.dags.back().spread.recent[3] = 4;
     for (std::size_t t = 0; t < tasks_each; ++t) {
       TaskFrame task{"task" + std::to_string(t), static_cast<std::uint32_t>(d), kSecond, kSecond / 2, kSecond / 4, {}};
       task.figures.released = count;
       task.figures.recent_max = static_cast<std::int64_t>(count);
       task.figures.waiting = static_cast<std::uint32_t>(t);
+      task.spread.all[0] = static_cast<std::uint32_t>(count);
+      task.spread.recent[page::kClasses - 1] = 3;
       frame.tasks.push_back(std::move(task));
     }
   }
@@ -134,7 +142,51 @@ TEST_F(LivePage, IsReadAsItWasWritten) {
     EXPECT_EQ(read.tasks[i].deadline, written.tasks[i].deadline);
     EXPECT_EQ(read.tasks[i].bound, written.tasks[i].bound);
     EXPECT_EQ(std::memcmp(&read.tasks[i].figures, &written.tasks[i].figures, sizeof(page::Figures)), 0);
+    EXPECT_EQ(std::memcmp(&read.tasks[i].spread, &written.tasks[i].spread, sizeof(page::Spread)), 0);
   }
+  EXPECT_EQ(read.dags[1].deadline, kSecond);
+  EXPECT_EQ(read.dags[1].late, 9U);
+  EXPECT_EQ(read.dags[1].recent_late, 2U);
+  EXPECT_EQ(read.dags[1].spread.recent[3], 4U);
+  EXPECT_EQ(read.threads_in_all, 5U);
+  ASSERT_THAT(read.threads, SizeIs(2));
+  EXPECT_EQ(read.threads[0].used, 100);
+  EXPECT_EQ(read.threads[0].recent_used, 10);
+  EXPECT_EQ(read.threads[0].task, 3U);
+  EXPECT_EQ(read.threads[1].index, 4U);
+  EXPECT_EQ(read.threads[1].task, std::nullopt);
+}
+
+// As programs write it that know neither alerts nor spreads: their rows are shorter.
+TEST_F(LivePage, RowsOfEarlierProgramsAreRead) {
+  const auto writer = make_writer();
+  writer->publish(make_frame());
+  const std::string path = copy(*writer);
+  const std::size_t slot = 4096 + kSlotSize;  // of frame 1
+  std::string bytes(std::filesystem::file_size(path), '\0');
+  std::ifstream(path, std::ios::binary).read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  std::string frame = bytes.substr(slot, page::kLeastFrameHeader);
+  std::size_t at = slot + sizeof(page::FrameHeader);
+  const auto take = [&](std::size_t size, std::size_t least) {
+    frame += bytes.substr(at, least);
+    at += size;
+  };
+  for (int dag = 0; dag < 2; ++dag) take(sizeof(page::DagRow), page::kLeastDagRow);
+  for (int task = 0; task < 6; ++task) take(sizeof(page::TaskRow), page::kLeastTaskRow);
+  const std::uint64_t sum = page::checksum(std::as_bytes(std::span(frame)).subspan(sizeof(std::uint64_t)));
+  std::memcpy(frame.data(), &sum, sizeof(sum));
+  overwrite(path, slot, frame);
+  overwrite(path, offsetof(page::Header, frame_header_size), static_cast<std::uint32_t>(page::kLeastFrameHeader));
+  overwrite(path, offsetof(page::Header, dag_row_size), static_cast<std::uint32_t>(page::kLeastDagRow));
+  overwrite(path, offsetof(page::Header, task_row_size), static_cast<std::uint32_t>(page::kLeastTaskRow));
+  const Result<Page> page = read_page(path);
+  ASSERT_TRUE(page) << to_string(page.error());
+  ASSERT_THAT(page->frame.tasks, SizeIs(6));
+  EXPECT_EQ(page->frame.tasks[5].name, "task2");
+  EXPECT_EQ(page->frame.tasks[5].figures.released, 7U);
+  EXPECT_EQ(page->frame.tasks[5].spread.all[0], 0U);
+  EXPECT_EQ(page->frame.dags[1].deadline, 0);
+  EXPECT_THAT(page->frame.threads, IsEmpty());
 }
 
 // As programs write it that know no alert: the rows follow earlier. Here there are none.
@@ -173,13 +225,25 @@ TEST_F(LivePage, GrowsAndShrinksFromFrameToFrame) {
 }
 
 TEST_F(LivePage, SaysWhatFoundNoRoom) {
-  const auto writer = make_writer(8192);
+  const auto writer = make_writer(16384);
   writer->publish(make_frame(4, 100));
   const Result<Page> page = read_page(writer->path());
   ASSERT_TRUE(page) << to_string(page.error());
   EXPECT_LT(page->frame.tasks.size(), 400U);
   EXPECT_GT(page->frame.tasks.size(), 0U);
   EXPECT_EQ(page->frame.left_out + page->frame.tasks.size(), 400U);
+}
+
+TEST_F(LivePage, AThreadDoesNotNameATaskThatFoundNoRoom) {
+  const auto writer = make_writer(16384);
+  Frame frame = make_frame(1, 100);
+  frame.threads = {{.index = 0, .task = 0}, {.index = 1, .task = 99}};
+  writer->publish(frame);
+  const Result<Page> page = read_page(writer->path());
+  ASSERT_TRUE(page) << to_string(page.error());
+  ASSERT_THAT(page->frame.threads, SizeIs(2));
+  EXPECT_EQ(page->frame.threads[0].task, 0U);
+  EXPECT_EQ(page->frame.threads[1].task, std::nullopt);
 }
 
 TEST_F(LivePage, LongNamesAreCutBetweenCharacters) {
@@ -347,13 +411,13 @@ TEST_F(LivePage, LiesAreFound) {
 // Random bytes, in a page whose checksum is then corrected, and pages of noise only. Reading always ends, and each
 // frame that it returns keeps its promises.
 TEST_F(LivePage, NoiseDoesNotCrashTheReader) {
-  const auto writer = make_writer(8192);
+  const auto writer = make_writer(16384);
   writer->publish(make_frame());
   const std::string path = copy(*writer);
   std::string original(std::filesystem::file_size(path), '\0');
   std::ifstream(path, std::ios::binary).read(original.data(), static_cast<std::streamsize>(original.size()));
   std::mt19937_64 random(20'251);
-  const std::size_t slot = 4096 + 8192;
+  const std::size_t slot = 4096 + 16384;
   int read = 0;
   for (int round = 0; round < 400; ++round) {
     std::string bytes = original;
@@ -361,7 +425,7 @@ TEST_F(LivePage, NoiseDoesNotCrashTheReader) {
     const std::size_t edits = all ? bytes.size() : 1 + random() % 6;
     for (std::size_t i = 0; i < edits; ++i) {
       // Most changes hit the structure; the header decides what the rest means.
-      const std::size_t at = all ? i : random() % 3 == 0 ? random() % 88 : slot + random() % 2600;
+      const std::size_t at = all ? i : random() % 3 == 0 ? random() % 88 : slot + random() % 4200;
       bytes[at] = random() % 4 == 0 ? '\xff' : static_cast<char>(random());
     }
     if (all) std::memcpy(bytes.data(), original.data(), round % 40 == 0 ? 88 : 0);
@@ -369,7 +433,7 @@ TEST_F(LivePage, NoiseDoesNotCrashTheReader) {
       page::FrameHeader head{};
       std::memcpy(&head, bytes.data() + slot, sizeof(head));
       const std::uint64_t size = sizeof(head) + head.dags * sizeof(page::DagRow) + head.tasks * sizeof(page::TaskRow);
-      if (size <= 8192) {
+      if (size <= 16384) {
         const auto *begin = reinterpret_cast<const std::byte *>(bytes.data() + slot);
         const std::uint64_t sum = page::checksum({begin + 8, begin + size});
         std::memcpy(bytes.data() + slot, &sum, sizeof(sum));

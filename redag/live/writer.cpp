@@ -163,6 +163,13 @@ void PageWriter::publish(const Frame &frame) {
   put_name(header.preemption, frame.preemption);
   put_name(header.policy, frame.policy);
   put_name(header.alert, frame.alert);
+  header.threads = static_cast<std::uint32_t>(std::min(frame.threads.size(), page::kThreads));
+  header.threads_in_all = frame.threads_in_all;
+  for (std::size_t i = 0; i < header.threads; ++i) {
+    const ThreadFrame &thread = frame.threads[i];
+    const bool is_kept = thread.task && *thread.task < tasks;
+    header.thread[i] = {thread.used, thread.recent_used, thread.index, is_kept ? *thread.task : page::kNoTask};
+  }
   put(header);
   for (std::size_t d = 0; d < dags; ++d) {
     const DagFrame &dag = frame.dags[d];
@@ -170,6 +177,10 @@ void PageWriter::publish(const Frame &frame) {
     put_name(row.name, dag.name);
     row.max_active = dag.max_active;
     row.figures = dag.figures;
+    row.deadline = dag.deadline;
+    row.late = dag.late;
+    row.recent_late = dag.recent_late;
+    row.spread = dag.spread;
     put(row);
   }
   for (std::size_t t = 0; t < tasks; ++t) {
@@ -181,6 +192,7 @@ void PageWriter::publish(const Frame &frame) {
     row.deadline = task.deadline;
     row.bound = task.bound;
     row.figures = task.figures;
+    row.spread = task.spread;
     put(row);
   }
   const std::span<const std::byte> checked(begin + sizeof(header.checksum), at);

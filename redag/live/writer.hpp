@@ -17,8 +17,8 @@
 namespace redag::live {
 
 inline constexpr const char *kFolder = "/dev/shm";
-/// The largest frame that can be published: a thousand DAGs with four thousand tasks.
-inline constexpr std::size_t kSlotSize = std::size_t{3} << 19U;
+/// The largest frame that can be published: a thousand DAGs with five thousand tasks.
+inline constexpr std::size_t kSlotSize = std::size_t{4} << 20U;
 
 class PageWriter {
  public:

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -12,9 +11,12 @@
 #include "redag/base/text.hpp"
 #include "redag/live/writer.hpp"
 #include "redag/runtime/clock.hpp"
-#include "redag_lab/cli/run/live_text.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/options.hpp"
+#include "redag_lab/cli/terminal/screen.hpp"
+#include "redag_lab/cli/top/attachment.hpp"
+#include "redag_lab/cli/top/live_json.hpp"
+#include "redag_lab/cli/top/top_loop.hpp"
 #include "redag_lab/cli/top/top_screen.hpp"
 
 namespace redag::cli {
@@ -27,25 +29,12 @@ struct Options {
   bool list = false;
   bool once = false;
   bool json = false;
-  bool dags_only = false;
-  bool since_start = false;
+  bool ascii = false;
+  LiveView view;
 };
 
 constexpr const char *kHowTo =
     "'redag run' publishes one by default; programs set ExecutorOptions::live, and ROS 2 nodes the parameter 'live'";
-
-std::optional<LiveTarget> parse_target(const std::string &text) {
-  LiveTarget target;
-  const char *const end = text.data() + text.size();
-  const auto pid = std::from_chars(text.data(), end, target.pid);
-  if (pid.ec != std::errc() || target.pid <= 0) return std::nullopt;
-  if (pid.ptr == end) return target;
-  std::uint32_t number = 0;
-  const auto rest = std::from_chars(pid.ptr + 1, end, number);
-  if (*pid.ptr != '.' || rest.ec != std::errc() || rest.ptr != end) return std::nullopt;
-  target.number = number;
-  return target;
-}
 
 int list(const Options &options, Console &console) {
   const std::vector<live::Listed> pages = live::list_pages(options.folder);
@@ -53,7 +42,7 @@ int list(const Options &options, Console &console) {
   if (options.json) {
     console.print(to_text(to_json(pages, now)));
   } else if (!pages.empty()) {
-    console.print(describe(pages, console.out_traits(), now));
+    console.print(list_text(pages, console.out_traits(), now));
   }
   if (!pages.empty()) return kExitOk;
   console.note("no running executor publishes a live page\n");
@@ -78,7 +67,7 @@ int show_once(const Options &options, const std::optional<LiveTarget> &target, C
     if (readable > 0) std::erase_if(pages, [](const live::Listed &listed) { return !listed.page; });
   }
   if (pages.size() > 1) {
-    console.note(describe(pages, console.err_traits(), now));
+    console.note(list_text(pages, console.err_traits(), now));
     console.error("several executors are running: name one", fmt::format("redag top {}", pages.front().pid));
     return kExitBad;
   }
@@ -91,13 +80,10 @@ int show_once(const Options &options, const std::optional<LiveTarget> &target, C
     console.print(to_text(to_json(listed, *listed.page, now)));
     return kExitOk;
   }
-  LiveView view;
-  view.dags_only = options.dags_only;
-  view.since_start = options.since_start;
-  const LiveText text = describe(listed, *listed.page, view, console.out_traits(), now);
-  for (const std::string &line : text.head) console.print(line + "\n");
-  console.print(text.titles + "\n");
-  for (const std::string &line : text.rows) console.print(line + "\n");
+  const StreamTraits &out = console.out_traits();
+  for (const Line &line : draw_once(listed, options.view, now, out.width, Glyphs{options.ascii})) {
+    console.print(with_codes(line, out.colour) + "\n");
+  }
   return kExitOk;
 }
 
@@ -114,31 +100,37 @@ int top(const Options &options, Console &console) {
   if (options.list) return list(options, console);
   if (options.once || options.json) return show_once(options, target, console);
   if (!Screen::is_possible()) {
-    console.note("the output is not a terminal: one frame is printed, as with --once\n");
+    console.note("the output is not a terminal that can be drawn on: one frame is printed, as with --once\n");
     return show_once(options, target, console);
   }
-  TopOptions screen;
-  screen.folder = options.folder;
-  screen.interval = options.interval;
-  screen.target = target;
-  screen.view.dags_only = options.dags_only;
-  screen.view.since_start = options.since_start;
-  screen.colour = console.out_traits().colour;
-  return run_top(screen);
+  return run_top(TopOptions{.folder = options.folder,
+                            .interval = options.interval,
+                            .target = target,
+                            .view = options.view,
+                            .glyphs = Glyphs{options.ascii},
+                            .colour = console.out_traits().colour});
 }
+
+constexpr std::array kOrders{LiveOrder::Dag,     LiveOrder::Name,   LiveOrder::Rate, LiveOrder::P99,
+                             LiveOrder::Longest, LiveOrder::Misses, LiveOrder::Cpu};
 
 }  // namespace
 
 Action add_top(CLI::App &app) {
   auto options = std::make_shared<Options>();
+  LiveView &view = options->view;
   CLI::Option *target = app.add_option("PID", options->target,
                                        "Process ID; by default the only running executor, or a list to choose from");
   CLI::Option *list = app.add_flag("--list", options->list, "List the running executors")->excludes(target);
   app.add_flag("--once", options->once, "Print one frame as text and exit")->excludes(list);
   app.add_flag("--json", options->json, "Print one frame (or the list) as a JSON document and exit");
   add_duration(app, "--interval", options->interval, "Time between two updates");
-  app.add_flag("--dags", options->dags_only, "Show only DAGs, not their tasks");
-  app.add_flag("--since-start", options->since_start, "Show figures since the start instead of over the last seconds");
+  add_choice(app, "--sort", view.order, choices_of(kOrders), "Order of the rows");
+  app.add_flag("--reverse", view.reversed, "Reverse the order");
+  app.add_option("--filter", view.filter, "Show only DAGs and tasks whose name contains this")->type_name("TEXT");
+  app.add_flag("--dags", view.dags_only, "Show only DAGs, not their tasks");
+  app.add_flag("--since-start", view.since_start, "Show figures since the start instead of over the last seconds");
+  app.add_flag("--ascii", options->ascii, "Draw graphs with ASCII characters");
   app.add_option("--folder", options->folder, "Folder of the live pages")
       ->type_name("DIR")
       ->capture_default_str()

@@ -1,63 +1,44 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// `redag top` on a terminal: keys, the choice of an executor, its display. Holds the screen until the user quits; one
-// thread.
+// The screen of `redag top` as lines of text: a pure function of what was read and of the state that keys change.
 #pragma once
 
-#include <cstdint>
-#include <optional>
+#include <cstddef>
 #include <string>
+#include <vector>
 
-#include "redag/base/time.hpp"
 #include "redag/live/reader.hpp"
-#include "redag_lab/cli/run/live_text.hpp"
-#include "redag_lab/cli/terminal/screen.hpp"
+#include "redag_lab/cli/terminal/console.hpp"
+#include "redag_lab/cli/terminal/styled.hpp"
+#include "redag_lab/cli/top/live_graphs.hpp"
+#include "redag_lab/cli/top/top_keys.hpp"
 
 namespace redag::cli {
 
-struct LiveTarget {
-  std::int64_t pid = 0;
-  std::optional<std::uint32_t> number;  // of the process's executors
-
-  [[nodiscard]] bool names(const live::Listed &listed) const {
-    return listed.pid == pid && (!number || *number == listed.number);
-  }
+/// What there is to show.
+struct TopInput {
+  const std::vector<live::Listed> &pages;  // of the running executors
+  const live::Listed *shown = nullptr;     // the executor, whose page is readable; null: none yet
+  bool is_gone = false;                    // it has ended
+  Time now = 0;                            // CLOCK_MONOTONIC
+  const Course *course = nullptr;          // null: there is none
 };
 
-struct TopOptions {
-  std::string folder;
-  Duration interval = kSecond;
-  std::optional<LiveTarget> target;
-  LiveView view;
-  bool colour = true;
+struct TopDrawing {
+  std::vector<Line> lines;  // as many as the screen has, none wider
+  TopPlaces places;
+  std::size_t first = 0;  // the row at the top, which keeps the marked one in sight
 };
 
-/// Remembers the watched executor, also across its restarts. A value.
-class Attachment {
- public:
-  explicit Attachment(std::optional<LiveTarget> target) : target_(target) {}
+[[nodiscard]] TopDrawing draw_top(const TopState &state, const TopInput &input, std::size_t columns, std::size_t lines,
+                                  const Glyphs &glyphs);
 
-  /// Returns the executor to show out of the running ones. Null means that it is gone (is_known()), or that there is
-  /// none or several to choose from. An executor that has ended is followed by the next one of the same name and
-  /// program.
-  [[nodiscard]] const live::Listed *find(const std::vector<live::Listed> &pages);
-  void attach(const live::Listed &listed);
-  [[nodiscard]] bool is_known() const { return known_.has_value(); }
-  [[nodiscard]] const std::string &name() const { return known_->name; }
+/// Returns one frame for `--once`: the lines above the table, and all its rows. `width` 0: no limit.
+[[nodiscard]] std::vector<Line> draw_once(const live::Listed &listed, const LiveView &view, Time now, std::size_t width,
+                                          const Glyphs &glyphs);
 
- private:
-  struct Known {
-    std::string path;
-    live::Process process;
-    std::string name;
-    std::string program;
-  };
-  std::optional<LiveTarget> target_;
-  std::optional<Known> known_;
-};
-
-/// Returns the exit status.
-[[nodiscard]] int run_top(const TopOptions &options);
+/// Returns one line per executor, below a line of titles.
+[[nodiscard]] std::string list_text(const std::vector<live::Listed> &pages, const StreamTraits &terminal, Time now);
 
 }  // namespace redag::cli

@@ -1,0 +1,72 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+#include "redag_lab/cli/serve/access.hpp"
+
+#include <fmt/format.h>
+#include <sys/random.h>
+
+#include <array>
+#include <cerrno>
+#include <system_error>
+
+namespace redag::cli {
+
+Result<std::string> make_token() {
+  std::array<unsigned char, 32> bytes{};
+  std::size_t have = 0;
+  while (have < bytes.size()) {
+    const ssize_t got = ::getrandom(bytes.data() + have, bytes.size() - have, 0);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) {
+      return make_error("the kernel gives no random numbers for the token: " + std::generic_category().message(errno));
+    }
+    have += static_cast<std::size_t>(got);
+  }
+  std::string token;
+  for (const unsigned char byte : bytes) token += fmt::format("{:02x}", byte);
+  return token;
+}
+
+bool is_same_secret(std::string_view given, std::string_view secret) noexcept {
+  if (given.size() != secret.size() || secret.empty()) return false;
+  // Volatile: a compiler must not end the loop at the first difference.
+  volatile unsigned char difference = 0;
+  for (std::size_t i = 0; i < secret.size(); ++i) {
+    difference = difference | static_cast<unsigned char>(given[i] ^ secret[i]);
+  }
+  return difference == 0;
+}
+
+std::string cookie_value(std::string_view header, std::string_view name) {
+  while (!header.empty()) {
+    const std::size_t end = std::min(header.find(';'), header.size());
+    std::string_view pair = header.substr(0, end);
+    header.remove_prefix(std::min(end + 1, header.size()));
+    pair.remove_prefix(std::min(pair.find_first_not_of(' '), pair.size()));
+    if (pair.size() > name.size() && pair.substr(0, name.size()) == name && pair[name.size()] == '=') {
+      return std::string(pair.substr(name.size() + 1));
+    }
+  }
+  return {};
+}
+
+bool Gate::is_own_name(std::string_view host) const {
+  const std::string port = fmt::format(":{}", port_);
+  return host == "127.0.0.1" + port || host == "localhost" + port;
+}
+
+Access Gate::judge(const Credentials &request) const {
+  if (request.hosts != 1 || !is_own_name(request.host)) return Access::WrongHost;
+  if (request.method != "GET" && request.method != "HEAD") return Access::WrongMethod;
+  if (request.path == "/" && is_same_secret(request.token, token_)) return Access::Introduced;
+  if (is_same_secret(cookie_value(request.cookie, cookie_name()), token_)) return Access::Granted;
+  if (is_same_secret(request.authorization, "Bearer " + token_)) return Access::Granted;
+  return Access::Denied;
+}
+
+std::string Gate::cookie() const {
+  return fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict", cookie_name(), token_);
+}
+
+}  // namespace redag::cli

@@ -1,0 +1,219 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+#include "redag_lab/cli/top/live_figures.hpp"
+
+#include <gtest/gtest.h>
+
+#include "redag_lab/cli/top/attachment.hpp"
+#include "redag_lab/cli/top/frame_for_tests.hpp"
+#include "redag_lab/cli/top/live_graphs.hpp"
+#include "redag_lab/cli/top/live_json.hpp"
+
+namespace redag::cli {
+namespace {
+
+using testing::small_page;
+using Names = std::vector<std::string>;
+
+Names names_of(const live::Listed &listed, const LiveView &view) {
+  Names names;
+  for (const LiveRow &row : rows_of(listed.page->frame, view)) names.push_back(full_name(row, listed.page->frame));
+  return names;
+}
+
+TEST(LiveRows, Orders) {
+  const live::Listed listed = small_page();
+  const auto names = [&](LiveOrder order, bool reversed = false, bool dags_only = false) {
+    return names_of(listed, {.order = order, .reversed = reversed, .dags_only = dags_only});
+  };
+  const Names upwards{"slow.plan", "fast.act", "fast.sense"};
+  const Names downwards{"fast.sense", "fast.act", "slow.plan"};
+  EXPECT_EQ(names(LiveOrder::Rate), upwards);
+  EXPECT_EQ(names(LiveOrder::Rate, true), downwards);
+  EXPECT_EQ(names(LiveOrder::Cpu), upwards);
+  EXPECT_EQ(names(LiveOrder::P99), downwards);
+  EXPECT_EQ(names(LiveOrder::Name), (Names{"fast.act", "fast.sense", "slow.plan"}));
+  EXPECT_EQ(names(LiveOrder::Dag), (Names{"fast", "fast.sense", "fast.act", "slow", "slow.plan"}));
+  EXPECT_EQ(names(LiveOrder::Dag, true), (Names{"slow", "slow.plan", "fast", "fast.sense", "fast.act"}));
+  EXPECT_EQ(names(LiveOrder::Dag, false, true), (Names{"fast", "slow"}));
+  EXPECT_EQ(names(LiveOrder::Name, true, true), (Names{"slow", "fast"}));
+}
+
+TEST(LiveRows, WhoMissesNowIsFirst) {
+  live::Listed listed = small_page();
+  listed.page->frame.tasks[0].figures.misses = 1000;
+  listed.page->frame.tasks[1].figures.misses = 2;
+  listed.page->frame.tasks[1].figures.recent_misses = 1;
+  EXPECT_EQ(names_of(listed, {.order = LiveOrder::Misses}), (Names{"fast.act", "fast.sense", "slow.plan"}));
+}
+
+TEST(LiveRows, AFilterKeepsTheDagsOfItsTasks) {
+  const live::Listed listed = small_page();
+  EXPECT_EQ(names_of(listed, {.filter = "PLAN"}), (Names{"slow", "slow.plan"}));
+  EXPECT_EQ(names_of(listed, {.filter = "fast"}), (Names{"fast", "fast.sense", "fast.act"}));
+  EXPECT_EQ(names_of(listed, {.order = LiveOrder::Name, .filter = "s"}),
+            (Names{"fast.act", "fast.sense", "slow.plan"}));
+  EXPECT_EQ(names_of(listed, {.order = LiveOrder::Name, .filter = "fast.s"}), (Names{"fast.sense"}));
+  EXPECT_EQ(names_of(listed, {.dags_only = true, .filter = "ow"}), (Names{"slow"}));
+  EXPECT_EQ(names_of(listed, {.filter = "x"}), Names{});
+}
+
+TEST(LiveFigures, Tints) {
+  EXPECT_EQ(response_tint(5, 0, 0), Tint::Plain);
+  EXPECT_EQ(response_tint(89, 100, 0), Tint::Plain);
+  EXPECT_EQ(response_tint(90, 100, 0), Tint::Caution);
+  EXPECT_EQ(response_tint(100, 100, 0), Tint::Caution);
+  EXPECT_EQ(response_tint(101, 100, 0), Tint::Bad);
+  EXPECT_EQ(response_tint(50, 100, 40), Tint::Bad);  // above the bound
+  EXPECT_EQ(response_tint(39, 100, 40), Tint::Caution);
+  EXPECT_EQ(response_tint(95, 100, 200), Tint::Caution);
+}
+
+TEST(LiveFigures, SayThatNobodyWrites) {
+  const live::Listed listed = small_page();
+  const live::Frame &frame = listed.page->frame;
+  EXPECT_EQ(overdue(frame, 21 * kSecond), std::nullopt);
+  EXPECT_EQ(overdue(frame, 25 * kSecond), 5 * kSecond);
+  EXPECT_EQ(overdue(frame, 19 * kSecond), std::nullopt);
+  live::Frame strange = frame;
+  strange.interval = kMaxDuration;  // must not overflow
+  EXPECT_EQ(overdue(strange, 25 * kSecond), std::nullopt);
+}
+
+TEST(LiveFigures, RatesAreOfTheWindowOrOfAll) {
+  const live::Frame &frame = small_page().page->frame;
+  EXPECT_EQ(rate_of(frame.tasks[0].figures, frame, false), 10);  // 20 jobs in 2 s
+  EXPECT_EQ(rate_of(frame.tasks[0].figures, frame, true), 10);   // 100 jobs in 10 s
+  EXPECT_DOUBLE_EQ(cpu_of(frame.tasks[0].figures, frame, false), 0.05);
+  EXPECT_DOUBLE_EQ(share_of({.used = kSecond, .recent_used = kSecond}, frame, false), 0.5);
+  EXPECT_DOUBLE_EQ(share_of({.used = kSecond, .recent_used = kSecond}, frame, true), 0.1);
+  EXPECT_EQ(rate_of(frame.tasks[0].figures, live::Frame{}, false), 0);
+}
+
+TEST(LiveJson, HasWhatIsShown) {
+  live::Listed listed = small_page();
+  live::Frame &frame = listed.page->frame;
+  frame.dags[0].deadline = 5 * kMillisecond;
+  frame.dags[0].late = 3;
+  frame.dags[0].recent_late = 1;
+  frame.tasks[0].spread.all[0] = 7;
+  frame.tasks[0].spread.all[20] = 5;
+  frame.threads_in_all = 2;
+  frame.threads = {{.index = 0, .used = kSecond, .recent_used = kSecond, .task = 2}, {.index = 1}};
+  const Json document = to_json(listed, *listed.page, 21 * kSecond);
+  EXPECT_EQ(document["format"], "redag.live/1");
+  EXPECT_EQ(document["age_ns"], kSecond);
+  EXPECT_EQ(document["alert"], nullptr);
+  EXPECT_EQ(document["tasks"][0]["bound_ns"], 2 * kMillisecond);
+  EXPECT_EQ(document["tasks"][1]["bound_ns"], nullptr);
+  EXPECT_EQ(document["tasks"][1]["rate"], 20.0);
+  EXPECT_EQ(document["tasks"][0]["histogram"]["all"], Json::parse("[[0, 7], [1048576, 5]]"));
+  EXPECT_EQ(document["tasks"][0]["histogram"]["recent"], Json::array());
+  EXPECT_EQ(document["dags"][0]["max_active"], 1);
+  EXPECT_EQ(document["dags"][0]["deadline_ns"], 5 * kMillisecond);
+  EXPECT_EQ(document["dags"][1]["deadline_ns"], nullptr);
+  EXPECT_EQ(document["dags"][0]["late"], 3);
+  EXPECT_EQ(document["dags"][0]["recent_late"], 1);
+  EXPECT_EQ(document["threads_in_all"], 2);
+  EXPECT_EQ(document["threads"][0]["cpu"], 0.5);
+  EXPECT_EQ(document["threads"][0]["task"], "slow.plan");
+  EXPECT_EQ(document["threads"][1]["task"], nullptr);
+}
+
+TEST(LiveGraphs, AHistogramSharesItsAxis) {
+  live::Frame frame = small_page().page->frame;
+  EXPECT_TRUE(axis_of(frame).is_empty());
+  EXPECT_EQ(plain(histogram(frame.tasks[0].spread.all, axis_of(frame), 0, 5, {})), "");
+  frame.tasks[0].spread.all[10] = 4;  // from 32.8 us
+  frame.tasks[0].spread.all[12] = 8;
+  frame.tasks[1].spread.all[13] = 1;  // from 98.3 us
+  const TimeAxis axis = axis_of(frame);
+  EXPECT_EQ(axis.first, 10U);
+  EXPECT_EQ(axis.last, 14U);
+  EXPECT_EQ(plain(histogram(frame.tasks[0].spread.all, axis, 0, 4, {})), "\u2584 \u2588");
+  EXPECT_EQ(plain(histogram(frame.tasks[0].spread.all, axis, 0, 2, {})), "\u2584\u2588");
+  EXPECT_EQ(plain(histogram(frame.tasks[0].spread.all, axis, 0, 8, {})), "\u2584\u2584  \u2588\u2588");
+  EXPECT_EQ(plain(histogram(frame.tasks[1].spread.all, axis, 0, 4, {.ascii = true})), "   #");
+  const Line late = histogram(frame.tasks[0].spread.all, axis, 60 * kMicrosecond, 4, {});
+  ASSERT_EQ(late.size(), 2U);
+  EXPECT_EQ(late[0].text, "\u2584 ");
+  EXPECT_EQ(late[0].tint, Tint::Plain);
+  EXPECT_EQ(late[1].tint, Tint::Bad);
+  EXPECT_EQ(axis_text(axis, 16), "33us       130us");
+  EXPECT_EQ(axis_text(axis, 8), "33us    ");
+}
+
+TEST(LiveGraphs, ABarIsAsLongAsItsShare) {
+  EXPECT_EQ(plain(share_bar(0.5, 20, {.ascii = true})), "[|||||       50.0 %]");
+  EXPECT_EQ(plain(share_bar(0, 20, {.ascii = true})), "[             0.0 %]");
+  EXPECT_EQ(plain(share_bar(7, 20, {.ascii = true})), "[|||||||||| 700.0 %]");
+  EXPECT_EQ(share_bar(0.95, 20, {})[1].tint, Tint::Bad);
+}
+
+TEST(LiveGraphs, ACourseRemembersRowsThatAreThere) {
+  live::Frame frame = small_page().page->frame;
+  Course course;
+  const auto graph = [&](std::size_t width) {
+    std::string text;
+    for (const Span &span : course.graph("fast.sense", 8, width, {.ascii = true})) text += span.text;
+    return text;
+  };
+  EXPECT_EQ(graph(3), "   ");
+  for (const Duration p99 : {1, 4, 8, 16}) {
+    ++frame.sequence;
+    frame.tasks[0].figures.recent_p99 = p99;
+    course.add(frame);
+    course.add(frame);  // the same look
+  }
+  EXPECT_EQ(graph(6), "  ..-#") << "of 16, the largest";
+  EXPECT_EQ(graph(2), "-#");
+  EXPECT_EQ(course.graph("fast.sense", 8, 2, {}).back().tint, Tint::Bad);
+  frame.tasks.erase(frame.tasks.begin());
+  ++frame.sequence;
+  course.add(frame);
+  EXPECT_EQ(graph(3), "   ");
+}
+
+TEST(Target, IsAProcessOrOneOfItsExecutors) {
+  EXPECT_EQ(parse_target("12")->pid, 12);
+  EXPECT_EQ(parse_target("12")->number, std::nullopt);
+  EXPECT_EQ(parse_target("12.3")->number, 3U);
+  for (const char *bad : {"", "x", "0", "-1", "12.", "12.x", "12.3.4", "12x"}) EXPECT_FALSE(parse_target(bad)) << bad;
+}
+
+TEST(Attachment, TheOnlyOneIsTaken) {
+  Attachment attachment(std::nullopt);
+  EXPECT_EQ(attachment.find({}), nullptr);
+  EXPECT_FALSE(attachment.is_known());
+  const std::vector<live::Listed> two{small_page(12), small_page(13)};
+  EXPECT_EQ(attachment.find(two), nullptr);
+  EXPECT_FALSE(attachment.is_known());
+  const std::vector<live::Listed> one{small_page(13)};
+  EXPECT_EQ(attachment.find(one), &one[0]);
+  EXPECT_EQ(attachment.find(two), &two[1]);
+}
+
+TEST(Attachment, FollowsARestart) {
+  Attachment attachment(LiveTarget{12, std::nullopt});
+  const std::vector<live::Listed> before{small_page(11), small_page(12)};
+  EXPECT_EQ(attachment.find(before), &before[1]);
+  const std::vector<live::Listed> other{small_page(14, "arm")};
+  EXPECT_EQ(attachment.find(other), nullptr);
+  EXPECT_TRUE(attachment.is_known());
+  const std::vector<live::Listed> after{small_page(14, "arm"), small_page(15)};
+  EXPECT_EQ(attachment.find(after), &after[1]);
+  // The number is reused by another process, and therefore by another executor.
+  const std::vector<live::Listed> reused{small_page(15, "arm", 2)};
+  EXPECT_EQ(attachment.find(reused), nullptr);
+}
+
+TEST(Attachment, PagesThatCannotBeReadAreNone) {
+  Attachment attachment(LiveTarget{12, std::nullopt});
+  live::Listed refused = small_page(12);
+  refused.page = make_error("no");
+  EXPECT_EQ(attachment.find({refused}), nullptr);
+}
+
+}  // namespace
+}  // namespace redag::cli

@@ -1,0 +1,120 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+#include "redag_lab/cli/top/live_json.hpp"
+
+#include <algorithm>
+
+#include "redag_lab/cli/top/live_figures.hpp"
+
+namespace redag::cli {
+namespace {
+
+Json or_null(Duration value) { return value > 0 ? Json(value) : Json(nullptr); }
+
+Json figures_json(const live::page::Figures &f, const live::Frame &frame) {
+  return {{"rate", rate_of(f, frame, false)},
+          {"cpu", cpu_of(f, frame, false)},
+          {"released", f.released},
+          {"finished", f.finished},
+          {"skipped", f.skipped},
+          {"aborted", f.aborted},
+          {"misses", f.misses},
+          {"deferred", f.deferred},
+          {"preemptions", f.preemptions},
+          {"cpu_ns", f.cpu},
+          {"response", {{"p50_ns", f.response_p50}, {"p99_ns", f.response_p99}, {"max_ns", f.response_max}}},
+          {"recent",
+           {{"finished", f.recent_jobs},
+            {"misses", f.recent_misses},
+            {"preemptions", f.recent_preemptions},
+            {"cpu_ns", f.recent_cpu},
+            {"response", {{"p50_ns", f.recent_p50}, {"p99_ns", f.recent_p99}, {"max_ns", f.recent_max}}}}},
+          {"active", f.active},
+          {"ready", f.ready},
+          {"waiting", f.waiting}};
+}
+
+/// Returns the classes that are not empty: [[least_ns, count], ...].
+Json classes_json(const std::uint32_t (&counts)[live::page::kClasses]) {
+  Json classes = Json::array();
+  for (std::size_t i = 0; i < live::page::kClasses; ++i) {
+    if (counts[i] > 0) classes.push_back({i == 0 ? 0 : live::page::least_in(i), counts[i]});
+  }
+  return classes;
+}
+
+Json histogram_json(const live::page::Spread &spread) {
+  return {{"recent", classes_json(spread.recent)}, {"all", classes_json(spread.all)}};
+}
+
+}  // namespace
+
+Json to_json(const live::Listed &listed, const live::Page &page, Time now) {
+  const live::Frame &frame = page.frame;
+  Json document = {{"format", "redag.live/1"},
+                   {"pid", listed.pid},
+                   {"number", listed.number},
+                   {"path", listed.path},
+                   {"name", frame.name},
+                   {"program", frame.program},
+                   {"driver", frame.driver},
+                   {"workers", frame.workers},
+                   {"preemption", frame.preemption},
+                   {"policy", frame.policy},
+                   {"sequence", frame.sequence},
+                   {"age_ns", std::max<Duration>(0, now - frame.published)},
+                   {"up_ns", frame.published - frame.began},
+                   {"interval_ns", frame.interval},
+                   {"window_ns", frame.window},
+                   {"page_cpu_ns", frame.publisher_cpu},
+                   {"left_out", frame.left_out},
+                   {"threads", Json::array()},
+                   {"threads_in_all", frame.threads_in_all},
+                   {"alert", frame.alert.empty() ? Json(nullptr) : Json(frame.alert)},
+                   {"dags", Json::array()},
+                   {"tasks", Json::array()}};
+  for (const live::ThreadFrame &thread : frame.threads) {
+    document["threads"].push_back(
+        {{"index", thread.index},
+         {"cpu", share_of(thread, frame, false)},
+         {"cpu_ns", thread.used},
+         {"task", thread.task ? Json(full_name(frame.tasks[*thread.task], frame)) : Json(nullptr)}});
+  }
+  for (const live::DagFrame &dag : frame.dags) {
+    Json row = {{"name", dag.name}, {"max_active", dag.max_active},   {"deadline_ns", or_null(dag.deadline)},
+                {"late", dag.late}, {"recent_late", dag.recent_late}, {"histogram", histogram_json(dag.spread)}};
+    row.update(figures_json(dag.figures, frame));
+    document["dags"].push_back(std::move(row));
+  }
+  for (const live::TaskFrame &task : frame.tasks) {
+    Json row = {{"dag", frame.dags[task.dag].name},  {"name", task.name},
+                {"period_ns", or_null(task.period)}, {"deadline_ns", or_null(task.deadline)},
+                {"bound_ns", or_null(task.bound)},   {"histogram", histogram_json(task.spread)}};
+    row.update(figures_json(task.figures, frame));
+    document["tasks"].push_back(std::move(row));
+  }
+  return document;
+}
+
+Json to_json(const std::vector<live::Listed> &pages, Time now) {
+  Json list = Json::array();
+  for (const live::Listed &listed : pages) {
+    Json row = {{"pid", listed.pid}, {"number", listed.number}, {"path", listed.path}};
+    if (listed.page) {
+      const live::Frame &frame = listed.page->frame;
+      row.update(Json{{"name", frame.name},
+                      {"program", frame.program},
+                      {"driver", frame.driver},
+                      {"tasks", frame.tasks.size()},
+                      {"up_ns", frame.published - frame.began},
+                      {"age_ns", std::max<Duration>(0, now - frame.published)}});
+    } else {
+      row["diagnostics"] = diagnostics_json(listed.page.error());
+    }
+    list.push_back(std::move(row));
+  }
+  return {{"format", "redag.live-list/1"}, {"executors", std::move(list)}};
+}
+
+}  // namespace redag::cli
