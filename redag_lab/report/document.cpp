@@ -81,7 +81,7 @@ Json columns(std::initializer_list<const char *> names) {
   return table;
 }
 
-Json to_json(const Window &window, Time end) {
+Json to_json(const Window &window, Time end, const std::vector<Duration> &end_to_end) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> index;
   Json jobs = columns({"task", "number", "release", "deadline", "finish", "outcome", "reason", "missed"});
   for (const JobRecord &job : window.jobs) {
@@ -93,7 +93,7 @@ Json to_json(const Window &window, Time end) {
     jobs["finish"].push_back(job.finish == kNever ? Json(nullptr) : Json(job.finish - job.release));
     jobs["outcome"].push_back(static_cast<int>(job.outcome));
     jobs["reason"].push_back(static_cast<int>(job.reason));
-    jobs["missed"].push_back(metrics::miss_of(job, end) == metrics::Miss::None ? 0 : 1);
+    jobs["missed"].push_back(metrics::miss_of(job, end, end_to_end[job.task.value]) == metrics::Miss::None ? 0 : 1);
   }
   Json slices = columns({"task", "job", "worker", "begin", "length", "how"});
   for (const Slice &slice : window.slices) {
@@ -111,7 +111,8 @@ Json to_json(const Window &window, Time end) {
 
 Json to_json(const Schedule &schedule, const trace::RunInfo &run) {
   Json windows = Json::array();
-  for (const Window &window : schedule.windows) windows.push_back(to_json(window, run.end));
+  const std::vector<Duration> end_to_end = metrics::end_to_end_deadlines(run.workload);
+  for (const Window &window : schedule.windows) windows.push_back(to_json(window, run.end, end_to_end));
   Json views = Json::array();
   for (const View &view : schedule.views) {
     Json row{{"window", view.window}, {"begin_ns", view.begin}, {"end_ns", view.end}};
@@ -207,6 +208,7 @@ class GroupWriter {
     const RunBounds &bounds = group_.bounds();
     return Json{{"label", group_.label()},
                 {"run", Json::parse(trace::run_info_to_json(group_.info()))},
+                {"headline", to_json(headline_of({&group_, 1}))},
                 {"verdict", std::move(verdict)},
                 {"total", to_json(group_.total())},
                 {"clusters", clusters()},
@@ -302,6 +304,17 @@ class GroupWriter {
   std::vector<bool> curves_;
 };
 
+// Returns the deadline of a DAG's end-to-end response. In a DAG without edges each task answers by itself: its deadline
+// is that of its tasks, if they have the same one.
+std::optional<Duration> answer_deadline(const Dag &dag) {
+  if (dag.deadline > 0) return dag.deadline;
+  const Duration first = dag.tasks.front().deadline;
+  const bool is_common = std::all_of(dag.tasks.begin(), dag.tasks.end(), [first](const Task &task) {
+    return task.predecessors.empty() && task.deadline == first;
+  });
+  return is_common ? std::optional(first) : std::nullopt;
+}
+
 // Returns the DAGs common to all groups with each group's figures over its repetitions. Shares and percentiles of the
 // repetitions are spreads. Counts and the maximum cover all repetitions.
 Json comparison(std::span<const Group> groups) {
@@ -333,6 +346,7 @@ Json comparison(std::span<const Group> groups) {
           {"missed", all.jobs.missed()},
           {"miss_ratio", to_json(spread_of(std::move(misses)))},
           {"end_to_end_late", all.end_to_end.late},
+          {"deadline_ns", optional_time(answer_deadline(group.workload().dags[index]))},
           {"p50_ns", over_runs(&metrics::Distribution::p50)},
           {"p95_ns", over_runs(&metrics::Distribution::p95)},
           {"p99_ns", over_runs(&metrics::Distribution::p99)},
@@ -382,6 +396,7 @@ std::string to_json(std::span<const Group> groups, const DocumentOptions &option
       {"provenance", to_json(options.provenance)},
       {"version", kVersion},
       {"title", title_of(groups)},
+      {"headline", to_json(headline_of(groups))},
       {"comparison", {{"words", std::move(words)}, {"dags", groups.size() > 1 ? comparison(groups) : Json::array()}}},
       {"groups", std::move(list)},
       {"cuts", cuts}};

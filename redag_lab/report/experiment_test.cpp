@@ -8,6 +8,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "redag_lab/report/page_assets.hpp"
+
 namespace redag::report {
 namespace {
 
@@ -80,6 +82,16 @@ TEST(ExperimentDocument, OtherFilesAreRefused) {
   nlohmann::json damaged = small_document();
   damaged.at("points").at(0).erase("factors");
   EXPECT_THAT(error_of(damaged.dump()), HasSubstr("cannot be read"));
+}
+
+TEST(ExperimentDocument, ThePageHasWordsForEveryMetric) {
+  const Result<ExperimentDocument> document = experiment_document(small_document().dump(), "factorial.json");
+  ASSERT_TRUE(document) << to_string(document.error());
+  const nlohmann::json json = nlohmann::json::parse(document->json);
+  for (const nlohmann::json &metric : json.at("metrics")) {
+    EXPECT_NE(assets::kExperimentScript.find("\n  " + metric.get<std::string>() + ": '"), std::string_view::npos)
+        << metric;
+  }
 }
 
 }  // namespace

@@ -14,5 +14,8 @@ extern const std::string_view kStyle;
 extern const std::string_view kEcharts;
 extern const std::string_view kScript;            // for recorded runs
 extern const std::string_view kExperimentScript;  // for a factorial experiment
+extern const std::string_view kLiveTemplate;      // for `redag serve`, as files of their own
+extern const std::string_view kLiveStyle;
+extern const std::string_view kLiveScript;
 
 }  // namespace redag::report::assets

@@ -6,8 +6,16 @@
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
 
+#include "redag/model/job_event.hpp"
+#include "redag/trace/trace.hpp"
+#include "redag_analysis/metrics/jobs.hpp"
 #include "redag_lab/report/page_assets.hpp"
+#include "redag_lab/report/schedule.hpp"
+#include "redag_lab/report/verdict.hpp"
 
 namespace redag::report {
 namespace {
@@ -64,6 +72,44 @@ TEST(Page, AssetsAreWholeAndCannotEndTheirElements) {
     EXPECT_EQ(asset.find("<!--"), std::string_view::npos);
     EXPECT_EQ(asset.find("</style"), std::string_view::npos);
   }
+}
+
+// Returns the keys of an object literal of the page's script, which has one key a line.
+std::vector<std::string> keys_of(std::string_view script, const std::string &object) {
+  std::vector<std::string> keys;
+  const std::string begin = "const " + object + " = {\n";
+  const std::size_t at = script.find(begin);
+  if (at == std::string_view::npos) return keys;
+  std::istringstream lines{std::string(script.substr(at + begin.size()))};
+  for (std::string line; std::getline(lines, line) && line != "};";) {
+    const std::size_t first = line.find_first_not_of(' ');
+    keys.push_back(line.substr(first, line.find(':') - first));
+  }
+  return keys;
+}
+
+// Names of an enumeration from its first value to `last`.
+template <class Enum>
+std::vector<std::string> names_to(Enum last) {
+  std::vector<std::string> names;
+  for (int i = 0; i <= static_cast<int>(last); ++i) names.emplace_back(to_string(static_cast<Enum>(i)));
+  return names;
+}
+
+// The document holds positions in these enumerations, and the page has words for each.
+TEST(Page, HasWordsForEveryNameThatTheProgramWrites) {
+  using metrics::JobOutcome;
+  using trace::Driver;
+  EXPECT_EQ(keys_of(assets::kScript, "REASONS"), names_to(kLastReason));
+  EXPECT_EQ(keys_of(assets::kScript, "OUTCOMES"), names_to(JobOutcome::Aborted));
+  EXPECT_EQ(keys_of(assets::kScript, "TONES"), names_to(Tone::Plain));
+  EXPECT_EQ(keys_of(assets::kScript, "ENDS"), (std::vector<std::string>{"finished", "aborted", "preempted", "open"}));
+  static_assert(static_cast<int>(Slice::End::Finished) == 0 && static_cast<int>(Slice::End::Aborted) == 1 &&
+                static_cast<int>(Slice::End::Preempted) == 2 && static_cast<int>(Slice::End::Open) == 3);
+  std::vector<std::string> worlds = names_to(Driver::RosNodes);
+  worlds.emplace_back("ros2");  // experiment::World
+  EXPECT_EQ(keys_of(assets::kScript, "DRIVERS"), worlds);
+  EXPECT_EQ(keys_of(assets::kScript, "WORLDS"), worlds);
 }
 
 }  // namespace

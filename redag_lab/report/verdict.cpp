@@ -29,10 +29,18 @@ std::string closest(const Group &group) {
   return fmt::format(" The closest to its deadline was {}, with {} to spare.", name, humanize_duration(-lateness));
 }
 
+Tone tone_of(const metrics::DeadlineVerdict &verdict) {
+  if (!verdict.is_judged) return Tone::Caution;
+  return verdict.is_met ? Tone::Good : Tone::Bad;
+}
+
+metrics::DeadlineVerdict deadlines_of(const Group &group) {
+  return metrics::deadline_verdict(group.total(), group.dags());
+}
+
 Sentence on_deadlines(const Group &group) {
-  const metrics::DeadlineVerdict verdict = metrics::deadline_verdict(group.total(), group.dags());
-  if (!verdict.is_judged) return {Tone::Caution, verdict.text};
-  return {verdict.is_met ? Tone::Good : Tone::Bad, verdict.text + closest(group)};
+  const metrics::DeadlineVerdict verdict = deadlines_of(group);
+  return {tone_of(verdict), verdict.is_judged ? verdict.text + closest(group) : verdict.text};
 }
 
 std::string first_of(std::vector<std::string> names, std::size_t most) {
@@ -222,6 +230,29 @@ std::string comparison_line(const std::string &dag, std::span<const Contender> c
                         format_share(contender.missed, contender.released));
   }
   return line + ": " + (any ? ranking(contenders) : "no deadline missed");
+}
+
+Sentence headline_of(std::span<const Group> groups) {
+  REDAG_CHECK(!groups.empty(), "a headline of nothing");
+  if (groups.size() == 1) {
+    const metrics::DeadlineVerdict verdict = deadlines_of(groups.front());
+    return {tone_of(verdict), verdict.headline};
+  }
+  std::vector<Contender> contenders;
+  std::string shares;
+  bool any = false;
+  for (const Group &group : groups) {
+    std::vector<double> misses;
+    for (const RunDigest &run : group.runs()) misses.push_back(run.summary.total.miss_ratio_with_lost());
+    const metrics::JobCounts &total = group.total();
+    contenders.push_back(
+        {.name = group.label(), .missed = total.missed(), .released = total.released, .misses = spread_of(misses)});
+    shares +=
+        fmt::format("{}{} {}", shares.empty() ? "" : ", ", group.label(), format_share(total.missed(), total.released));
+    any = any || total.missed() > 0;
+  }
+  if (!any) return {Tone::Good, "No job missed its deadline under any executor"};
+  return {Tone::Plain, fmt::format("Deadlines: {} ({} of all jobs)", ranking(contenders), shares)};
 }
 
 std::vector<Sentence> compare(std::span<const Group> groups) {

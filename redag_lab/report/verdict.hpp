@@ -29,6 +29,10 @@ struct Sentence {
 /// Returns the sentences about one group: deadlines, bounds, the trace checker, execution times, disturbances.
 [[nodiscard]] std::vector<Sentence> verdict_of(const Group &group);
 
+/// Returns the result in one line, without a period: of one group, whether deadlines were met; of several, which one
+/// misses fewest. Requires a group.
+[[nodiscard]] Sentence headline_of(std::span<const Group> groups);
+
 /// True if the DAG's longest end-to-end response exceeds its bound by more than an uncalibrated machine may add.
 [[nodiscard]] bool is_above_bound(const Group &group, DagId dag);
 

@@ -15,7 +15,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kMostExplained = 20'000;
-constexpr std::size_t kWorst = 100;      // misses that are shown
+constexpr std::size_t kMostListed = 1'000;
+constexpr std::size_t kWorst = 100;      // misses whose parts are shown
 constexpr std::size_t kMostShown = 400;  // with those in the schedule
 constexpr std::size_t kClosest = 20;     // jobs that are shown without a miss
 constexpr std::size_t kMostCauses = 40;
@@ -30,15 +31,34 @@ Json to_json(const metrics::Explanation &one, const Workload &workload) {
     parts["work"].push_back(metrics::is_work(part.cause) ? 1 : 0);
     parts["text"].push_back(metrics::describe(part, workload, id));
   }
-  const std::vector<metrics::Culprit> culprits = metrics::culprits_of(one);
-  return {{"task", id.task.value},
-          {"number", id.number},
-          {"missed", one.miss != metrics::Miss::None},
-          {"end_to_end", one.end_to_end},
-          {"length_ns", one.length()},
-          {"text", metrics::headline(one, workload)},
-          {"main", culprits.empty() ? "" : metrics::describe(culprits.front(), workload)},
+  return {{"task", id.task.value},        {"number", id.number},       {"missed", one.miss != metrics::Miss::None},
+          {"end_to_end", one.end_to_end}, {"length_ns", one.length()}, {"text", metrics::headline(one, workload)},
           {"parts", std::move(parts)}};
+}
+
+WorstJob row_of(const metrics::Explanation &one, const trace::RunInfo &run) {
+  WorstJob row{.job = one.job, .since = one.job.release - run.start, .lateness = {}, .main_cause = {}};
+  if (one.miss != metrics::Miss::Lost) row.lateness = one.lateness();
+  const std::vector<metrics::Culprit> culprits = metrics::culprits_of(one);
+  if (!culprits.empty()) row.main_cause = culprits.front();
+  return row;
+}
+
+// By column, with times in ns.
+Json to_json(const std::vector<WorstJob> &worst, const Workload &workload) {
+  Json rows = Json::object();
+  for (const char *name : {"task", "number", "since", "lateness", "outcome", "reason", "main"})
+    rows[name] = Json::array();
+  for (const WorstJob &row : worst) {
+    rows["task"].push_back(row.job.task.value);
+    rows["number"].push_back(row.job.number);
+    rows["since"].push_back(row.since);
+    rows["lateness"].push_back(row.lateness ? Json(*row.lateness) : Json());
+    rows["outcome"].push_back(static_cast<int>(row.job.outcome));
+    rows["reason"].push_back(static_cast<int>(row.job.reason));
+    rows["main"].push_back(row.main_cause ? Json(metrics::describe(*row.main_cause, workload)) : Json());
+  }
+  return rows;
 }
 
 }  // namespace
@@ -53,6 +73,7 @@ WhyDigest why_of(const trace::Trace &trace, const metrics::KernelRecord *kernel,
   std::vector<metrics::Explanation> all = investigation.explain(subjects);
   why.explained = all.size();
   why.causes = metrics::culprits_of(all);
+  for (std::size_t i = 0; i < std::min(kMostListed, all.size()); ++i) why.worst.push_back(row_of(all[i], trace.info));
   std::set<metrics::JobId> seen;
   for (const Window &window : schedule.windows) {
     for (const metrics::JobRecord &job : window.jobs) seen.insert({job.task, job.number});
@@ -75,8 +96,11 @@ std::string to_json(const WhyDigest &why, const Workload &workload) {
   }
   Json jobs = Json::array();
   for (const metrics::Explanation &one : why.jobs) jobs.push_back(to_json(one, workload));
-  const Json document{
-      {"misses", why.misses}, {"explained", why.explained}, {"causes", std::move(causes)}, {"jobs", std::move(jobs)}};
+  const Json document{{"misses", why.misses},
+                      {"explained", why.explained},
+                      {"causes", std::move(causes)},
+                      {"worst", to_json(why.worst, workload)},
+                      {"jobs", std::move(jobs)}};
   return document.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,10 +16,19 @@
 
 namespace redag::report {
 
+/// A row of the list of the worst jobs.
+struct WorstJob {
+  metrics::JobRecord job;
+  Time since = 0;                              // its release, from the start of the run
+  std::optional<Duration> lateness;            // of the deadline that it missed most; empty: it was lost
+  std::optional<metrics::Culprit> main_cause;  // empty: it was lost at its release
+};
+
 struct WhyDigest {
   std::size_t misses = 0;
   std::size_t explained = 0;  // misses that the causes cover
   std::vector<metrics::Culprit> causes;
+  std::vector<WorstJob> worst;             // all misses up to a limit, the worst first; without a miss the closest jobs
   std::vector<metrics::Explanation> jobs;  // the worst misses, and those that the schedule shows
 };
 

@@ -70,37 +70,55 @@ void DifferenceSide::make_rows(const Workload &workload) {
   }
 }
 
-void DifferenceSide::add(const trace::Trace &trace) {
-  const trace::RunInfo &run = trace.info;
+void DifferenceSide::begin_run(const trace::RunInfo &run) {
   if (runs_.empty()) make_rows(run.workload);
   REDAG_CHECK(places_.size() == run.workload.task_count(), "runs of different tasks on one side");
   runs_.push_back(run);
-
   const Time begin = run.start + run.warm_up;
   const Duration length = std::max<Duration>(1, run.end - begin);
   const Duration block = block_length(length, longest_period(run.workload));
   const auto blocks = static_cast<std::size_t>(std::max<Duration>(1, length / block));
   for (Row &row : rows_) row.runs.emplace_back(blocks);
-  for (const metrics::JobRecord &job : metrics::fold_jobs(run.workload, trace.events)) {
-    if (job.release < begin) continue;
-    const std::size_t at = std::min(blocks - 1, static_cast<std::size_t>((job.release - begin) / block));
-    const metrics::Miss miss = metrics::miss_of(job, run.end);
-    const Places &places = places_[job.task.value];
-    for (const std::size_t index : {std::size_t{0}, places.dag, places.task}) {
-      Row &row = rows_[index];
-      row.jobs.count(job, miss);
-      Block &here = row.runs.back()[at];
-      ++here.released;
-      if (miss != metrics::Miss::None) ++here.missed;
-    }
-    if (job.outcome != metrics::JobOutcome::Finished) continue;
-    const auto respond = [&](Row &row, Duration response) {
-      row.max = std::max(row.max, response);
-      row.runs.back()[at].responses.push_back(response);
-    };
-    respond(rows_[places.task], job.response());
-    if (places.end_to_end) respond(rows_[*places.end_to_end], job.finish - job.origin);
+  counting_.emplace(Counting{metrics::JobFolder(run.workload), begin, block});
+}
+
+void DifferenceSide::add_events(std::span<const JobEvent> events) {
+  counting_->folder.add(events);
+  counting_->folder.drain_ended([this](const metrics::JobRecord &job) { count(job); });
+}
+
+void DifferenceSide::end_run() {
+  for (const metrics::JobRecord &job : counting_->folder.in_flight()) count(job);
+  counting_.reset();
+}
+
+void DifferenceSide::add(const trace::Trace &trace) {
+  begin_run(trace.info);
+  add_events(trace.events);
+  end_run();
+}
+
+void DifferenceSide::count(const metrics::JobRecord &job) {
+  if (job.release < counting_->begin) return;
+  const std::size_t blocks = rows_.front().runs.back().size();
+  const auto block = static_cast<std::size_t>((job.release - counting_->begin) / counting_->block);
+  const std::size_t at = std::min(blocks - 1, block);
+  const metrics::Miss miss = metrics::miss_of(job, runs_.back().end);
+  const Places &places = places_[job.task.value];
+  for (const std::size_t index : {std::size_t{0}, places.dag, places.task}) {
+    Row &row = rows_[index];
+    row.jobs.count(job, miss);
+    Block &here = row.runs.back()[at];
+    ++here.released;
+    if (miss != metrics::Miss::None) ++here.missed;
   }
+  if (job.outcome != metrics::JobOutcome::Finished) return;
+  const auto respond = [&](Row &row, Duration response) {
+    row.max = std::max(row.max, response);
+    row.runs.back()[at].responses.push_back(response);
+  };
+  respond(rows_[places.task], job.response());
+  if (places.end_to_end) respond(rows_[*places.end_to_end], job.finish - job.origin);
 }
 
 bool DifferenceSide::Row::has_responses() const {

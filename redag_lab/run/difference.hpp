@@ -7,6 +7,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -20,7 +21,12 @@ namespace redag::lab {
 /// The runs of one side. All runs have the same task names.
 class DifferenceSide {
  public:
-  /// Counts the jobs of one run. The first run determines the tasks; all other runs must have the same ones.
+  /// Counts the jobs of one run, whose events are given by add_events() until end_run(). The first run determines the
+  /// tasks; all other runs must have the same ones.
+  void begin_run(const trace::RunInfo &run);
+  void add_events(std::span<const JobEvent> events);
+  void end_run();
+  /// The three of a whole trace.
   void add(const trace::Trace &trace);
 
   [[nodiscard]] const std::vector<trace::RunInfo> &runs() const { return runs_; }
@@ -46,11 +52,20 @@ class DifferenceSide {
     std::optional<std::size_t> end_to_end;  // the row of its DAG, if the task is its only sink
   };
 
+  // What is known of the run that is being counted.
+  struct Counting {
+    metrics::JobFolder folder;
+    Time begin = 0;
+    Duration block = 0;
+  };
+
   void make_rows(const Workload &workload);
+  void count(const metrics::JobRecord &job);
 
   std::vector<trace::RunInfo> runs_;
   std::vector<Row> rows_;
   std::vector<Places> places_;  // rows of a task, by TaskId
+  std::optional<Counting> counting_;
 };
 
 enum class Verdict : std::uint8_t {

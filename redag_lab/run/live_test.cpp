@@ -70,6 +70,10 @@ TEST(Figures, SayWhereJobsAre) {
   EXPECT_EQ(waiting.ready, 0U);
   EXPECT_EQ(waiting.waiting, 1U);
 
+  live::Sample running_now;
+  add_threads(running_now, *engine, std::vector{TaskId(10), TaskId(11), TaskId(12)});
+  EXPECT_EQ(running_now.threads[0].task, 10U);
+
   go.set();
   while (engine->figures(TaskId(2)).jobs.finished == 0) std::this_thread::yield();
   live::TaskSample late;
@@ -82,9 +86,40 @@ TEST(Figures, SayWhereJobsAre) {
   fill(in_time, engine->figures(TaskId(1)));
   EXPECT_EQ(in_time.misses, 0U);
   EXPECT_EQ(in_time.response->counts().total(), 1U);
+  // Sinks answer for the DAG. Where nothing precedes one, its responses are end to end.
+  EXPECT_EQ(late.end_to_end, late.response);
+  EXPECT_EQ(in_time.end_to_end, nullptr);
+  live::TaskSample after;
+  fill(after, engine->figures(TaskId(2)));
+  EXPECT_NE(after.end_to_end, after.response);
+  EXPECT_EQ(after.end_to_end->counts().total(), 1U);
+  EXPECT_GE(after.end_to_end->longest(), after.response->longest());
+  live::Sample sample;
+  add_threads(sample, *engine, std::vector{TaskId(10), TaskId(11), TaskId(12)});
+  ASSERT_EQ(sample.threads.size(), 1U);
+  EXPECT_GT(sample.threads[0].used, 0);
+  EXPECT_EQ(sample.threads[0].task, std::nullopt);
   engine->miss(TaskId(1), engine->now(), Reason::Overrun);
   fill(in_time, engine->figures(TaskId(1)));
   EXPECT_EQ(in_time.misses, 1U);
+}
+
+TEST(Figures, AnswersAfterTheDagsDeadlineAreCounted) {
+  Workload workload = make_workload({make_dag("d", {{"first", 1000}, {"last", 1000, 1, {0}}})});
+  workload.dags[0].deadline = 3 * kSecond;
+  const runtime::Body nothing = [](const runtime::Job &) { return sched::Outcome::Finished; };
+  const auto engine = make_engine(workload, true, {nothing, nothing});
+  ASSERT_TRUE(engine->start());
+  engine->set_origin(runtime::monotonic_now() - 10 * kSecond);
+  for (const Duration age : {5 * kSecond, Duration{0}}) {
+    const std::uint64_t before = engine->figures(TaskId(1)).jobs.finished;
+    const Time nominal = engine->now() - age;
+    engine->release(TaskId(0), nominal);
+    engine->release(TaskId(1), nominal);
+    while (engine->figures(TaskId(1)).jobs.finished == before) std::this_thread::yield();
+  }
+  EXPECT_EQ(engine->figures(TaskId(1)).late_end_to_end, 1U);
+  EXPECT_EQ(engine->figures(TaskId(0)).late_end_to_end, 0U) << "not a sink";
 }
 
 TEST(Figures, AJobThatThrowsIsAMissWithoutAResponse) {
@@ -145,6 +180,8 @@ TEST(LiveExecutor, IsSeenWhileItRuns) {
   EXPECT_EQ(frame.tasks[0].name, "imu");
   EXPECT_EQ(frame.tasks[0].deadline, 5 * kMillisecond);
   EXPECT_GT(frame.tasks[0].figures.response_max, 0);
+  EXPECT_GT(frame.dags[0].figures.response_max, 0) << "end to end";
+  EXPECT_EQ(frame.threads_in_all, 1U);
   executor.stop();
   EXPECT_FALSE(own_page("live-test"));
 }

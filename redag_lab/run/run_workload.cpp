@@ -209,7 +209,7 @@ class Run {
     auto publisher = live::Publisher::start(live_options(workload_.name, "threads", result_.mode, config()),
                                             [this, bounds = std::move(bounds)](live::Sample &sample) {
                                               for (const Dag &dag : workload_.dags)
-                                                sample.dags.push_back({shown_name(dag), dag.max_active});
+                                                sample.dags.push_back({shown_name(dag), dag.max_active, dag.deadline});
                                               for (const TaskRef &ref : flatten(workload_)) {
                                                 live::TaskSample task;
                                                 fill(task, engine_of(ref.id).figures(local(ref.id)));
@@ -221,6 +221,8 @@ class Run {
                                                 task.bound = bounds[ref.id.value];
                                                 sample.tasks.push_back(std::move(task));
                                               }
+                                              for (const auto &instance : instances_)
+                                                add_threads(sample, *instance->engine, instance->part.tasks);
                                             });
     if (publisher) {
       live_ = *std::move(publisher);

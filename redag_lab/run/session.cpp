@@ -55,47 +55,70 @@ trace::RunInfo describe_simulation(const Workload &workload, const Variant &vari
   return info;
 }
 
-// Keeps the first events of a stream, up to the end of an instant, and the time of the cut.
-class Prefix {
+// Lets the first events of a stream pass, up to the end of an instant, and knows the time of the cut.
+class Limit {
  public:
-  Prefix(std::vector<JobEvent> &events, std::size_t limit) : events_(events), limit_(limit) {}
+  explicit Limit(std::uint64_t most) : most_(std::max<std::uint64_t>(most, 1)) {}
 
-  void add(std::span<const JobEvent> events) {
-    if (cut_) return;
+  std::span<const JobEvent> admit(std::span<const JobEvent> events) {
+    if (cut_ || events.empty()) return {};
+    if (count_ + events.size() <= most_) {
+      count_ += events.size();
+      last_ = events.back().time;
+      return events;
+    }
     // Nothing happens between two instants. Cut before the end of that gap, the prefix is the whole trace of a shorter
     // run. At the end of the gap, a job that should have finished there would be visible.
-    for (const JobEvent &event : events) {
-      if (events_.size() >= limit_ && event.time - events_.back().time > 1) {
-        cut_ = event.time - 1;
-        return;
+    for (std::size_t i = 0; i < events.size(); ++i) {
+      if (count_ >= most_ && events[i].time - last_ > 1) {
+        cut_ = events[i].time - 1;
+        return events.first(i);
       }
-      events_.push_back(event);
+      ++count_;
+      last_ = events[i].time;
     }
+    return events;
   }
 
+  [[nodiscard]] std::uint64_t admitted() const { return count_; }
   [[nodiscard]] std::optional<Time> cut() const { return cut_; }
 
  private:
-  std::vector<JobEvent> &events_;
-  std::size_t limit_;
+  std::uint64_t most_;
+  std::uint64_t count_ = 0;
+  Time last_ = 0;
   std::optional<Time> cut_;
 };
 
-// Evaluates a run's events as they arrive: the summary, and the trace of the first events.
+// Evaluates a run's events as they arrive: the summary; and of the first events the check, the files and the trace.
 class Evaluation {
  public:
-  /// `session` must outlive this object.
-  Evaluation(Session &session, trace::RunInfo info, std::size_t max_events)
+  /// `session` must outlive this object. `is_exact`: the run is simulated, and nothing disturbs it.
+  Evaluation(Session &session, trace::RunInfo info, const SessionOptions &options, bool is_exact)
       : session_(session),
         info_(std::move(info)),
         summarizer_(info_),
-        kept_(session.trace.events, std::max<std::size_t>(max_events, 1)) {}
+        checker_(info_, metrics::rules_for(info_)),
+        limit_(options.max_events),
+        kept_limit_(std::min(options.max_events, kMostKeptEvents)),
+        keeps_(options.keep_trace || !is_exact),
+        defers_(!is_exact && options.max_events <= kMostKeptEvents),
+        files_options_(options.files) {
+    if (!defers_) open_files();
+  }
+
+  /// Why there are no files.
+  [[nodiscard]] const Diagnostics &problems() const { return problems_; }
 
   /// Adds events in order of time, whole instants at once.
   void add(std::span<const JobEvent> events) {
     session_.events += events.size();
     summarizer_.add(events);
-    kept_.add(events);
+    const std::span<const JobEvent> admitted = limit_.admit(events);
+    if (!defers_) examine(admitted);
+    if (!keeps_) return;
+    const std::span<const JobEvent> kept = kept_limit_.admit(admitted);
+    session_.trace.events.insert(session_.trace.events.end(), kept.begin(), kept.end());
   }
 
   /// Misses so far, by DAG.
@@ -103,19 +126,48 @@ class Evaluation {
 
   /// `info` is that of the whole run. Call finish() once, at the end.
   void finish(trace::RunInfo info) {
+    if (defers_) {
+      open_files();
+      examine(session_.trace.events);
+    }
     info_.lost_events = info.lost_events;  // the other fields were known before the first event
     session_.summary = summarizer_.finish(info.end);
+    session_.checked = limit_.admitted();
+    session_.cut_at = limit_.cut();
+    session_.check = checker_.finish(session_.cut_at.value_or(info.end), info.lost_events);
+    session_.trace.info = info;
+    session_.trace.info.end = kept_limit_.cut().value_or(session_.cut_at.value_or(info.end));
     session_.info = std::move(info);
-    session_.cut_at = kept_.cut();
-    session_.trace.info = session_.info;
-    if (session_.cut_at) session_.trace.info.end = *session_.cut_at;
+    session_.files = std::move(files_);
   }
 
  private:
+  void open_files() {
+    if (files_options_.folder.empty()) return;
+    Result<RunFiles> files = RunFiles::create(files_options_, info_);
+    if (files) {
+      files_ = std::make_unique<RunFiles>(*std::move(files));
+    } else {
+      problems_ = std::move(files.error());
+    }
+  }
+
+  void examine(std::span<const JobEvent> events) {
+    checker_.add(events);
+    if (files_) files_->add(events);
+  }
+
   Session &session_;
   trace::RunInfo info_;
   metrics::Summarizer summarizer_;
-  Prefix kept_;
+  metrics::TraceChecker checker_;
+  Limit limit_;
+  Limit kept_limit_;
+  bool keeps_;
+  bool defers_;  // examines the events after the run
+  FilesOptions files_options_;
+  std::unique_ptr<RunFiles> files_;
+  Diagnostics problems_;
 };
 
 Result<Session> simulate(const Workload &workload, const Variant &variant, SessionOptions options,
@@ -128,7 +180,8 @@ Result<Session> simulate(const Workload &workload, const Variant &variant, Sessi
   }
   Session session;
   trace::RunInfo info = describe_simulation(workload, variant, options);
-  Evaluation evaluation(session, info, options.max_events);
+  Evaluation evaluation(session, info, options, true);
+  if (!evaluation.problems().empty()) return tl::unexpected<Diagnostics>(evaluation.problems());
   std::uint64_t batches = 0;
   const auto sink = [&](std::span<const JobEvent> events) {
     evaluation.add(events);
@@ -184,10 +237,6 @@ std::vector<runtime::Body> logged(std::vector<runtime::Body> &bodies, KernelReco
   return out;
 }
 
-void check(Session &session) {
-  session.check = metrics::check_trace(session.trace, metrics::rules_for(session.trace.info));
-}
-
 Result<Session> run_on_threads(const Workload &workload, const Variant &variant, const SessionOptions &options,
                                const ProgressHook &progress) {
   RunOptions run;
@@ -217,27 +266,33 @@ Result<Session> run_on_threads(const Workload &workload, const Variant &variant,
     kernel = *std::move(started);
     run.bodies = [&kernel](std::vector<runtime::Body> bodies, const Now &) { return logged(bodies, *kernel); };
   }
+  const auto is_realtime_run = [&run](const trace::RunInfo &info) {
+    return run.realtime_threads || info.preemption == to_string(PreemptionMode::Os);
+  };
+  const auto charged = [&](trace::RunInfo info) {
+    if (!options.calibration) return info;
+    const Result<Overheads> machine = options.calibration->of(is_realtime_run(info));
+    if (machine) info.overheads = to_string(*machine);
+    return info;
+  };
   Session session;
   std::optional<Evaluation> evaluation;
   run.sink = [&](const trace::RunInfo &info, std::span<const JobEvent> events) {
     if (kernel) kernel->collect();
-    if (!evaluation) evaluation.emplace(session, info, options.max_events);
+    if (!evaluation) evaluation.emplace(session, charged(info), options, false);
     evaluation->add(events);
   };
   if (progress) run.progress = [&](Time now, std::span<const JobEvent>) { progress(now, evaluation->missed()); };
   Result<RunResult> result = run_workload(workload, run);
   if (!result) return tl::unexpected<Diagnostics>(std::move(result.error()));
 
-  const bool realtime_threads = run.realtime_threads || result->mode.mode == PreemptionMode::Os;
+  const bool realtime_threads = is_realtime_run(result->trace.info);
   if (options.calibration) {
-    const Result<Overheads> machine = options.calibration->of(realtime_threads);
-    if (machine) {
-      result->trace.info.overheads = to_string(*machine);
-    } else {
+    if (const Result<Overheads> machine = options.calibration->of(realtime_threads); !machine)
       result->warnings.push_back(machine.error().front().message + ": no overheads are charged");
-    }
   }
-  evaluation->finish(std::move(result->trace.info));
+  evaluation->finish(charged(std::move(result->trace.info)));
+  if (!evaluation->problems().empty()) return tl::unexpected<Diagnostics>(evaluation->problems());
   if (kernel) {
     session.kernel = kernel->stop(result->origin);
     session.kernel->run = session.info.provenance;
@@ -264,7 +319,6 @@ Result<Session> run_session(const Workload &workload, const Variant &variant, co
                                 ? simulate(*configured, variant, options, progress)
                                 : run_on_threads(*configured, variant, options, progress);
   if (!session) return session;
-  check(*session);
   session->elapsed = since(begin);
   return session;
 }
@@ -275,7 +329,8 @@ Session session_of(trace::Trace trace) {
   session.info = session.trace.info;
   session.summary = metrics::summarize(session.trace);
   session.events = session.trace.events.size();
-  check(session);
+  session.checked = session.events;
+  session.check = metrics::check_trace(session.trace, metrics::rules_for(session.trace.info));
   return session;
 }
 

@@ -8,6 +8,7 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -21,18 +22,24 @@
 #include "redag_analysis/metrics/kernel_record.hpp"
 #include "redag_analysis/metrics/summary.hpp"
 #include "redag_analysis/sim/simulator.hpp"
+#include "redag_lab/run/run_files.hpp"
 #include "redag_lab/run/variant.hpp"
 
 namespace redag::lab {
+
+/// The most events of a run that stay in memory, at 32 bytes each. Runs on threads of at most this length are checked
+/// and written after their end, because the work would disturb them.
+inline constexpr std::uint64_t kMostKeptEvents = std::uint64_t{1} << 22U;
 
 struct SessionOptions {
   trace::Driver driver = trace::Driver::Simulator;
   Duration duration = 10 * kSecond;
   Duration warm_up = 0;
   std::uint64_t seed = 1;
-  /// Number of events kept, 32 bytes each, up to the end of an instant. Later events enter the summary, but are neither
-  /// checked nor written.
-  std::size_t max_events = std::size_t{1} << 22U;
+  /// Number of events that are checked and written, up to the end of an instant. Later events only enter the summary.
+  std::uint64_t max_events = kMostKeptEvents;
+  FilesOptions files;                       // written while the run goes on, and completed by write_session()
+  bool keep_trace = true;                   // false: Session::trace has no events
   const std::atomic<bool> *stop = nullptr;  // ends the run early, with the results so far
   sim::Overheads overheads;                 // simulator
   std::optional<Calibration> calibration;   // overheads of a machine: simulated; on threads, charged to bounds
@@ -54,9 +61,11 @@ using ProgressHook = std::function<void(Time now, const std::vector<std::uint64_
 struct Session {
   trace::RunInfo info;
   metrics::Summary summary;                     // of the whole run
-  trace::Trace trace;                           // its first events; all of them unless cut_at
-  std::optional<Time> cut_at;                   // `max_events` was reached: `trace` is that of a run that ended here
-  metrics::CheckReport check;                   // of `trace`
+  trace::Trace trace;                           // its first events: at most kMostKeptEvents
+  std::uint64_t checked = 0;                    // its events that were checked and written; all of them unless cut_at
+  std::optional<Time> cut_at;                   // `max_events` was reached: they are those of a run that ended here
+  metrics::CheckReport check;                   // of these events
+  std::unique_ptr<RunFiles> files;              // of SessionOptions::files, not yet complete
   std::optional<metrics::KernelRecord> kernel;  // of SessionOptions::kernel
   bool realtime_threads = false;                // the jobs ran on SCHED_FIFO threads
   std::uint64_t events = 0;                     // of the whole run
@@ -65,7 +74,7 @@ struct Session {
   std::vector<std::string> warnings;            // caveats for a reader of the figures
 };
 
-/// Runs a session. `workload` must be valid. Error: resources that the machine refused.
+/// Runs a session. `workload` must be valid. Errors: resources that the machine refused, an unwritable folder.
 [[nodiscard]] Result<Session> run_session(const Workload &workload, const Variant &variant,
                                           const SessionOptions &options, const ProgressHook &progress = {});
 

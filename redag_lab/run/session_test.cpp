@@ -4,12 +4,18 @@
 #include "redag_lab/run/session.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <filesystem>
+
+#include "redag/trace/events_file.hpp"
 #include "redag_analysis/metrics/summary_json.hpp"
 #include "redag_testing/builders.hpp"
 
 namespace redag::lab {
 namespace {
+
+namespace fs = std::filesystem;
 
 // Returns two tasks on one worker; `slow` always makes `fast` miss unless it is preempted.
 Workload fast_and_slow() {
@@ -99,6 +105,61 @@ TEST(Session, ALongRunOnThreadsKeepsItsFirstEventsAndSummarizesAll) {
   EXPECT_EQ(cut.info.end, options.duration);
   // The summary includes every release: in 100 ms, fast has ten and slow has one.
   EXPECT_EQ(cut.summary.total.released, run("redag-none", simulated(500 * kMillisecond)).summary.total.released);
+}
+
+// The files of a run, in a folder that is removed at the end.
+class SessionFiles : public ::testing::Test {
+ protected:
+  void SetUp() override { fs::create_directories(folder_); }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  [[nodiscard]] trace::Trace events() const {
+    Result<trace::Trace> trace = trace::read_trace((folder_ / "events.redag").string());
+    EXPECT_TRUE(trace) << to_string(trace.error());
+    return *std::move(trace);
+  }
+
+  fs::path folder_ = fs::path(::testing::TempDir()) / ("redag_session." + std::to_string(::getpid()));
+};
+
+TEST_F(SessionFiles, HoldTheEventsOfTheRunAndTheTraceNone) {
+  SessionOptions options = simulated(2 * kSecond);
+  const Session kept = run("redag", options);
+  options.files.folder = folder_.string();
+  options.keep_trace = false;
+  const Session streamed = run("redag", options);
+  EXPECT_TRUE(fs::is_empty(folder_)) << "files appear when they are complete";
+  EXPECT_TRUE(streamed.files->commit(streamed.info.end, 0).empty());
+  EXPECT_EQ(streamed.files->names(), "jobs.csv, events.redag, trace.pftrace");
+  EXPECT_TRUE(streamed.trace.events.empty());
+  EXPECT_EQ(streamed.checked, kept.trace.events.size());
+  EXPECT_EQ(streamed.check.checks_by_rule, kept.check.checks_by_rule);
+  EXPECT_TRUE(events().events == kept.trace.events);
+  EXPECT_EQ(events().info.end, kept.info.end);
+}
+
+TEST_F(SessionFiles, OfALongRunOnThreadsAreWrittenMeanwhile) {
+  SessionOptions options = simulated(300 * kMillisecond);
+  options.driver = trace::Driver::Threads;
+  options.max_events = kMostKeptEvents + 1;
+  options.files.folder = folder_.string();
+  const Session session = run("redag-none", options);
+  EXPECT_TRUE(session.check.ok()) << session.check.to_string();
+  EXPECT_TRUE(session.files->commit(session.info.end, session.info.lost_events).empty());
+  EXPECT_EQ(events().events.size(), session.events);
+  EXPECT_TRUE(events().events == session.trace.events);
+}
+
+TEST_F(SessionFiles, AFolderThatIsGoneIsAnError) {
+  SessionOptions options = simulated(kSecond);
+  options.files.folder = (folder_ / "nowhere").string();
+  for (const trace::Driver driver : {trace::Driver::Simulator, trace::Driver::Threads}) {
+    options.driver = driver;
+    options.duration = 50 * kMillisecond;
+    const Result<Session> session = run_session(fast_and_slow(), *parse_variant("redag-none"), options);
+    ASSERT_FALSE(session);
+    EXPECT_EQ(session.error().front().file, options.files.folder + "/events.redag");
+  }
 }
 
 TEST(SensibleDuration, IsWholeHyperperiods) {

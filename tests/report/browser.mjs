@@ -7,43 +7,9 @@
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
 import path from 'node:path';
-import {pathToFileURL} from 'node:url';
-import {chromium} from 'playwright-core';
+import {FIGURES, browserOf} from './pages.mjs';
 
-const [executable, scratch] = process.argv.slice(2);
-const shot = (name) => path.join(scratch, 'screenshots', `${name}.png`);
-const FIGURES = {comparison: ['missed', 'p99', 'responses', 'lateness', 'timeline', 'schedule']};
-FIGURES.experiment = ['curves', 'distance', 'bounds', 'effects'];
-FIGURES.worlds = ['curves', 'distance', 'worlds'];
-FIGURES.executors = ['worlds'];
-FIGURES.single = FIGURES.hostile = FIGURES.long = FIGURES.wide = FIGURES.comparison.slice(2);
-
-const browser = await chromium.launch({executablePath: executable, args: ['--no-sandbox', '--disable-gpu']});
-let failures = 0;
-async function test(name, body) {
-  try {
-    await body();
-    console.log(`ok       ${name}`);
-  } catch (error) {
-    failures += 1;
-    console.log(`FAILED   ${name}: ${error.message}`);
-  }
-}
-
-/** Opens a page; `problems` collects what must not happen. */
-async function open(name, options = {}) {
-  const context = await browser.newContext({viewport: {width: 1280, height: 900}, colorScheme: 'light', acceptDownloads: true, ...options});
-  const page = await context.newPage();
-  const problems = [];
-  const url = pathToFileURL(path.join(scratch, `${name}.html`)).href;
-  page.on('console', (message) => { if (['error', 'warning'].includes(message.type())) problems.push(message.text()); });
-  page.on('pageerror', (error) => problems.push(String(error)));
-  page.on('request', (request) => { if (!/^(data|blob):/.test(request.url()) && request.url() !== url) problems.push(`request: ${request.url()}`); });
-  const began = Date.now();
-  await page.goto(url);
-  await page.waitForSelector('html[data-ready=true]', {timeout: 60000});
-  return {page, problems, took: Date.now() - began, close: () => context.close()};
-}
+const {open, test, none, shot, scratch, end} = await browserOf(process.argv.slice(2));
 
 /** How much each figure draws: shapes of an SVG, or distinct colours of a canvas. */
 const drawn = (page) => page.evaluate(() => Object.fromEntries([...document.querySelectorAll('figure[data-figure]')].map((box) => {
@@ -62,7 +28,6 @@ async function assertAllDrawn(page, figures) {
   assert.deepEqual(Object.keys(counts).sort(), [...figures].sort());
   for (const [name, count] of Object.entries(counts)) assert.ok(count >= 10, `figure ${name} is empty (${count})`);
 }
-const none = (problems) => assert.deepEqual(problems, []);
 /** The shapes and words of an SVG figure, without the names that ECharts makes anew for every drawing. */
 const drawing = (page, name) => page.locator(`figure[data-figure=${name}] .chart`).evaluate((box) => [...box.querySelectorAll('svg path, svg text')]
   .map((shape) => [shape.getAttribute('d'), shape.getAttribute('transform'), shape.textContent].join(' ')).join('\n'));
@@ -116,7 +81,7 @@ await test('print: white paper, all figures, also from a dark screen', async () 
   await page.setViewportSize({width: 700, height: 990});
   await page.evaluate(() => window.dispatchEvent(new Event('beforeprint')));
   assert.equal(await page.evaluate(() => getComputedStyle(document.body).backgroundColor), 'rgb(255, 255, 255)');
-  assert.deepEqual(await page.locator('button:visible').allInnerTexts(), ['redag'], 'of all buttons, only which executor it is');
+  assert.deepEqual(await page.locator('button:visible:not(.sort, .link)').allInnerTexts(), ['redag'], 'of all buttons, only which executor it is');
   await assertAllDrawn(page, FIGURES.comparison);
   await page.screenshot({path: shot('print'), fullPage: true});
   await page.evaluate(() => window.dispatchEvent(new Event('afterprint')));
@@ -150,7 +115,7 @@ await test('controls: each changes what it says', async () => {
   assert.equal(await page.getByLabel('task', {exact: true}).inputValue(), 'control.pid', 'the task stays chosen');
   await changes(pixels, () => page.getByLabel('show', {exact: true}).selectOption({index: 1}), 'a view');
   await figureShot(page, 'schedule', 'worst-job');
-  await changes(pixels, button('zoom out'), 'zooming');
+  await changes(pixels, button('schedule: zoom out'), 'zooming');
   await changes(pixels, button('workers'), 'rows');
   await figureShot(page, 'schedule', 'workers');
   await assertAllDrawn(page, FIGURES.comparison);
@@ -245,7 +210,7 @@ await test('legends end where the buttons begin', async () => {
   for (const [name, options] of [['comparison', {}], ['wide', {}], ['comparison', {viewport: {width: 390, height: 844}}]]) {
     const {page, close} = await open(name, options);
     const beside = await page.evaluate(() => [...document.querySelectorAll('figure[data-figure]')].flatMap((box) => {
-      const buttons = box.querySelector('.save').getBoundingClientRect();
+      const buttons = box.querySelector('.tools').getBoundingClientRect();
       // A legend that has too little room is clipped and shows arrows.
       const end = (text) => {
         const clipped = text.closest('[clip-path]');
@@ -286,7 +251,7 @@ await test('every figure is saved as PNG and SVG', async () => {
     const {page, problems, close} = await open('comparison');  // Chromium lets one page save only ten files
     for (const [kind, magic] of [['svg', '<svg'], ['png', '\x89PNG']]) {
       const waiting = page.waitForEvent('download', {timeout: 20000});
-      await page.getByRole('button', {name: `${name} as ${kind}`, exact: true}).click();
+      await page.getByRole('button', {name: `${name}: save as ${kind.toUpperCase()}`, exact: true}).click();
       const file = path.join(scratch, 'screenshots', `saved-${name}.${kind}`);
       const download = await waiting;
       assert.equal(download.suggestedFilename(), `redag-${name}.${kind}`);
@@ -304,5 +269,4 @@ await test('every figure is saved as PNG and SVG', async () => {
   }
 });
 
-await browser.close();
-process.exit(failures > 0 ? 1 : 0);
+await end();

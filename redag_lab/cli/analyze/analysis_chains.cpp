@@ -65,7 +65,8 @@ Result<ChainRow> find_chain(const lab::Analysed &analysed, const std::string &ch
 }
 
 std::string describe(const lab::Analysed &analysed, const std::vector<ChainRow> &chains, const StreamTraits &terminal) {
-  Table table({{"chain", false, 9}, {"reaction", true, 8}, {"age", true, 7}, {"LET", true, 5}});
+  Table table(
+      {{.title = "chain", .importance = 9, .prose = true}, {"reaction", true, 8}, {"age", true, 7}, {"LET", true, 5}});
   std::string parts;
   for (const ChainRow &row : chains) {
     const std::string let = row.let ? humanize_duration(*row.let) : "-";

@@ -39,7 +39,7 @@ std::string table_of(const char *title, const std::vector<lab::Row> &rows, const
                {"deadline", true, 4},
                {"bound", true, 7},
                {"slack", true, 5},
-               {"verdict", false, 8, true},
+               {"verdict", false, 8},
                {"method", false, 3}});
   for (const lab::Row &row : rows) {
     const Tint tint = tint_of(row.standing);
@@ -102,7 +102,7 @@ std::string method_table(const lab::Analysed &analysed, const StreamTraits &term
       if (report.bound() != nullptr && report.trusted == trusted) order.push_back(&report);
     }
   }
-  Table table({{"method", false, 9, true}, {"answer", false, 8, true}, {"why", false, 1}});
+  Table table({{"method", false, 9}, {"answer", false, 8}, {.title = "why", .importance = 1, .prose = true}});
   for (const MethodReport *report : order) {
     const std::string paper = report->method->is_paper() ? "paper: " : "";
     table.add({{std::string(report->method->name)}, answer(*report), {paper + remark(analysed, *report), Tint::Faint}});

@@ -148,9 +148,9 @@ bool report(const Parts &parts, const Options &options, Console &console) {
     const std::string text = text_of(parts[p], (*asked)[p], options, console.out_traits());
     if (has_text && !text.empty()) console.print("\n");
     has_text = has_text || !text.empty();
-    console.print(text);
+    console.say(text);
   }
-  if (options.methods) console.print("\n" + describe_methods());
+  if (options.methods) console.say("\n" + describe_methods());
   return true;
 }
 
@@ -197,7 +197,7 @@ int analyze_file(const Options &options, Console &console) {
     const bool wants_file =
         options.analysis.run.json || !options.explain.empty() || !options.chains.empty() || options.explore > 0;
     if (options.methods && !wants_file) {
-      console.print(describe_methods());
+      console.say(describe_methods());
       return kExitOk;
     }
     console.error("FILE is required", "only --methods works without it");
@@ -229,7 +229,8 @@ int analyze_file(const Options &options, Console &console) {
 
 Action add_analyze(CLI::App &app) {
   auto options = std::make_shared<Options>();
-  app.add_option("FILE", options->analysis.run.file, "Workload file (YAML); - reads standard input");
+  app.add_option("FILE", options->analysis.run.file, "Workload file (YAML); - reads standard input")
+      ->type_name("WORKLOAD");
   add_choice(app, "--executor", options->executor, executor_choices(),
              "Executor to analyse: ReDAG-RT, or a model of one of rclcpp's executors")
       ->default_str(options->executor);

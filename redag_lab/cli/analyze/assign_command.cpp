@@ -77,7 +77,11 @@ int assign_clusters(const Workload &workload, const Options &options, Console &c
     return kExitBad;
   }
   if (placement->stopped) console.warn(watch.why_stop() + ": not every DAG has been placed");
-  console.print(options.analysis.run.json ? to_text(to_json(*placement)) : describe(*placement, console.out_traits()));
+  if (options.analysis.run.json) {
+    console.print(to_text(to_json(*placement)));
+  } else {
+    console.say(describe(*placement, console.out_traits()));
+  }
   if (!placement->left_over.empty()) return kExitNo;
   if (!write_result(options, placement->workload, !placement->placed.empty(), console)) return kExitBad;
   return options.analysis.run.check && !placement->is_schedulable() ? kExitNo : kExitOk;
@@ -115,7 +119,7 @@ int assign_file(const Options &options, Console &console) {
   if (options.analysis.run.json) {
     console.print(to_text(to_json(assigned)));
   } else {
-    console.print(describe(assigned, console.out_traits(), options.analysis.run.all_tasks));
+    console.say(describe(assigned, console.out_traits(), options.analysis.run.all_tasks));
   }
   const bool is_changed = !changes(assigned.assignment).empty();
   if (!write_result(options, assigned.assignment.best.workload, is_changed, console)) return kExitBad;
@@ -127,7 +131,9 @@ int assign_file(const Options &options, Console &console) {
 Action add_assign(CLI::App &app) {
   auto options = std::make_shared<Options>();
   lab::AssignmentOptions &assignment = options->assignment;
-  app.add_option("FILE", options->analysis.run.file, "Workload file (YAML); - reads standard input")->required();
+  app.add_option("FILE", options->analysis.run.file, "Workload file (YAML); - reads standard input")
+      ->type_name("WORKLOAD")
+      ->required();
   app.add_option("-o,--output", options->output, "File for the workload with the best assignment; comments are lost")
       ->type_name("FILE");
   add_choice(

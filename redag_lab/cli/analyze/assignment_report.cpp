@@ -33,12 +33,12 @@ std::vector<Cell> score_cells(const BoundScore &score) {
 }
 
 Table score_table(const char *title) {
-  return Table({{title, false, 9, true},
-                {"schedulable", false, 8, true},
+  return Table({{title, false, 9},
+                {"schedulable", false, 8},
                 {"unbounded", true, 3},
                 {"worst lateness", true, 7},
                 {"least slack", true, 6},
-                {"max_active", false, 2}});
+                {.title = "max_active", .importance = 2, .prose = true}});
 }
 
 std::string orders_table(const Assignment &assignment, const StreamTraits &terminal) {
@@ -67,8 +67,8 @@ std::string trials_table(const Assigned &assigned, const StreamTraits &terminal,
   const Ranked trials = ranked(assigned);
   const Workload &workload = assigned.assignment.best.workload;
   const std::size_t shown = all ? trials.size() : std::min(trials.size(), kMostTrials);
-  Table table({{"max_active", false, 9},
-               {"schedulable", false, 8, true},
+  Table table({{.title = "max_active", .importance = 9, .prose = true},
+               {"schedulable", false, 8},
                {"unbounded", true, 3},
                {"worst lateness", true, 7},
                {"least slack", true, 6}});

@@ -53,8 +53,11 @@ class Diffing {
     progress_.draw(1, "comparing");
     diffed_.difference = lab::compare_sides(diffed_.a.jobs, diffed_.b.jobs, diffed_.options);
     progress_.clear();
-    console_.print(options_.json ? to_text(to_json(diffed_))
-                                 : describe(diffed_, console_.out_traits(), options_.all_tasks));
+    if (options_.json) {
+      console_.print(to_text(to_json(diffed_)));
+    } else {
+      console_.say(describe(diffed_, console_.out_traits(), options_.all_tasks));
+    }
     return options_.check && diffed_.difference.is_any(lab::Verdict::Worse) ? kExitNo : kExitOk;
   }
 
@@ -81,13 +84,10 @@ class Diffing {
         return false;
       }
       progress_.draw(static_cast<double>(i) / static_cast<double>(traces.size()), traces[i]);
-      const Result<trace::Trace> trace = trace::read_trace(traces[i]);
-      if (!trace) {
-        progress_.clear();
-        console_.note(trace.error());
-        return false;
-      }
-      if (const std::string other = add(*trace, side); !other.empty()) {
+      Result<trace::EventsReader> reader = trace::EventsReader::open(traces[i]);
+      if (!reader) return fail(reader.error());
+      const std::string other = difference_to(side, reader->info());
+      if (!other.empty()) {
         progress_.clear();
         if (labels.size() > 1) {
           console_.error(fmt::format("{} holds runs of several kinds: {}", place, some_of(labels)),
@@ -98,24 +98,30 @@ class Diffing {
         }
         return false;
       }
+      side.jobs.begin_run(reader->info());
+      const Result<void> read = reader->visit([&side](auto events) { side.jobs.add_events(events); });
+      if (!read) return fail(read.error());
+      side.jobs.end_run();
     }
     progress_.clear();
     return true;
   }
 
-  // Adds a trace. Returns the reason why it is no repetition of the earlier runs, or an empty text.
-  static std::string add(const trace::Trace &trace, DiffSide &side) {
-    if (!side.jobs.runs().empty()) {
-      const trace::RunInfo &first = side.jobs.runs().front();
-      const bool same_way = first.executor == trace.info.executor && first.preemption == trace.info.preemption &&
-                            first.driver == trace.info.driver &&
-                            trace::worker_count(first) == trace::worker_count(trace.info);
-      if (!same_way) return "the executor, preemption mode, number of workers or driver differs";
-      const std::vector<lab::Change> changes = lab::changes_between(first.workload, trace.info.workload);
-      if (!changes.empty()) return changes.front().text();
-    }
-    side.jobs.add(trace);
-    return {};
+  // Returns the reason why a run is no repetition of the earlier ones; empty: it is one.
+  static std::string difference_to(const DiffSide &side, const trace::RunInfo &run) {
+    if (side.jobs.runs().empty()) return {};
+    const trace::RunInfo &first = side.jobs.runs().front();
+    const bool same_way = first.executor == run.executor && first.preemption == run.preemption &&
+                          first.driver == run.driver && trace::worker_count(first) == trace::worker_count(run);
+    if (!same_way) return "the executor, preemption mode, number of workers or driver differs";
+    const std::vector<lab::Change> changes = lab::changes_between(first.workload, run.workload);
+    return changes.empty() ? std::string() : changes.front().text();
+  }
+
+  bool fail(const Diagnostics &errors) {
+    progress_.clear();
+    console_.note(errors);
+    return false;
   }
 
   // Only workloads with the same demand can be compared. Otherwise a difference does not describe the scheduling.
@@ -149,8 +155,9 @@ Action add_diff(CLI::App &app) {
   app.add_option(
          "A", options->a,
          "Folder of a run or of its repetitions, as written by run, simulate, compare, or by run_workload of ROS 2")
+      ->type_name("RESULT")
       ->required();
-  app.add_option("B", options->b, "Folder to compare it with")->required();
+  app.add_option("B", options->b, "Folder to compare it with")->type_name("RESULT")->required();
   add_number(app, "--tolerance", options->bootstrap.tolerance, {0, kMostTolerance},
              "Share by which response percentiles may differ and still count as equal");
   app.add_flag("--different", options->different, "Compare runs of different workloads, for the tasks that both have");

@@ -55,7 +55,7 @@ std::string describe(const Placement &placement, const StreamTraits &terminal) {
                {.title = "workers", .number = true, .importance = 1},
                {.title = "utilization", .number = true, .importance = 1},
                {.title = "deadlines", .importance = 2},
-               {.title = "DAGs", .importance = 2}});
+               {.title = "DAGs", .importance = 2, .prose = true}});
   const std::vector<Workload> served = dags_of(workload);
   for (std::size_t c = 0; c < served.size(); ++c) {
     const Cluster &cluster = workload.platform.clusters[c];

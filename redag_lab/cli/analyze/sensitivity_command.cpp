@@ -135,7 +135,7 @@ int sensitivity_of_file(const Options &options, Console &console) {
   if (options.analysis.run.json) {
     console.print(to_text(to_json(sensitivity)));
   } else {
-    console.print(describe(sensitivity, console.out_traits(), options.analysis.run.all_tasks));
+    console.say(describe(sensitivity, console.out_traits(), options.analysis.run.all_tasks));
   }
   const bool yes = sensitivity.analysed.report.verdict == analysis::Verdict::Schedulable;
   return options.analysis.run.check && !yes ? kExitNo : kExitOk;
@@ -146,7 +146,7 @@ int sensitivity_of_file(const Options &options, Console &console) {
 Action add_sensitivity(CLI::App &app) {
   auto options = std::make_shared<Options>();
   RunArguments &run = options->analysis.run;
-  app.add_option("FILE", run.file, "Workload file (YAML); - reads standard input")->required();
+  app.add_option("FILE", run.file, "Workload file (YAML); - reads standard input")->type_name("WORKLOAD")->required();
   app.add_option("--task", options->task, "Analyze one task (dag.task) or DAG only")->type_name("TASK");
   add_count(app, "--probes", options->probes, {0, kMostProbes},
             "Number of extra positions tested, to see whether acceptance is monotone");

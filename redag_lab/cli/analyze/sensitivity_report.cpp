@@ -76,9 +76,9 @@ std::string again_text(const lab::Analysed &analysed, const Margin &margin) {
 std::string table_of(const Sensitivity &sensitivity, const std::vector<const KnobResult *> &rows,
                      const StreamTraits &terminal) {
   const bool simulated = sensitivity.simulated_for > 0;
-  std::vector<Column> columns = {{"what", false, 9, true}, {"now", true, 5}, {"limit", true, 7}, {"factor", true, 8}};
+  std::vector<Column> columns = {{"what", false, 9}, {"now", true, 5}, {"limit", true, 7}, {"factor", true, 8}};
   if (simulated) columns.push_back({"simulated", true, 6});
-  columns.push_back({"limited by", false, 1});
+  columns.push_back({.title = "limited by", .importance = 1, .prose = true});
   Table table(columns);
   for (const KnobResult *row : rows) {
     const Margin &margin = row->margin;

@@ -146,8 +146,11 @@ int tune_file(const Options &options, Console &console) {
   }
   tuning.tuned = *std::move(tuned);
   if (tuning.tuned.stopped) console.warn("interrupted: this is the best setting found so far");
-  console.print(options.run.json ? to_text(to_json(tuning))
-                                 : describe(tuning, console.out_traits(), options.all_trials));
+  if (options.run.json) {
+    console.print(to_text(to_json(tuning)));
+  } else {
+    console.say(describe(tuning, console.out_traits(), options.all_trials));
+  }
   if (const int status = write(options.output, tuning.tuned, console); status != kExitOk) return status;
   const lab::SettingCandidate &best = tuning.tuned.best;
   const bool missed = best.score.all().missed + best.held_out.all().missed > 0;
@@ -159,7 +162,9 @@ int tune_file(const Options &options, Console &console) {
 Action add_tune(CLI::App &app) {
   auto options = std::make_shared<Options>();
   lab::TuneOptions &tune = options->tune;
-  app.add_option("FILE", options->run.file, "Workload file (YAML); - reads standard input")->required();
+  app.add_option("FILE", options->run.file, "Workload file (YAML); - reads standard input")
+      ->type_name("WORKLOAD")
+      ->required();
   app.add_option("-o,--output", options->output, "File for the tuned workload; comments are lost")->type_name("FILE");
   const auto objective = [](lab::Objective value) { return std::pair(std::string(objective_name(value)), value); };
   add_choice(app, "--objective", tune.goal.objective,
@@ -170,7 +175,7 @@ Action add_tune(CLI::App &app) {
       ->default_str(objective_name(tune.goal.objective));
   app.add_flag("--per-criticality", tune.goal.per_criticality, "Compare settings by their most critical DAGs first");
   app.add_option("--vary", options->vary, "What may change: workers, max_active, order (of DAGs with equal priority)")
-      ->type_name("LIST")
+      ->type_name(type_name({"LIST", {"workers", "max_active", "order"}}))
       ->capture_default_str();
   app.add_option("--caps", options->caps,
                  "Values of max_active to try for every DAG (default: none, and all values that can matter)")

@@ -67,9 +67,9 @@ std::string ties_text(const Workload &workload, const Point &point) {
 }
 
 std::string scores_table(const Tuning &tuning, const StreamTraits &terminal) {
-  Table table({{"", false, 9, true},
+  Table table({{"", false, 9},
                {"seeds", false, 3},
-               {"proven", false, 5, true},
+               {"proven", false, 5},
                {"missed", true, 8},
                {"lost", true, 2},
                {"max lateness", true, 7},
@@ -102,9 +102,9 @@ Ranked ranked(const Tuning &tuning) {
 std::string trials_table(const Tuning &tuning, const Ranked &trials, const StreamTraits &terminal) {
   const Workload &workload = tuning.tuned.present.workload;
   Table table({{"workers", true, 8},
-               {"max_active", false, 9},
+               {.title = "max_active", .importance = 9, .prose = true},
                {"tie order", false, 1},
-               {"proven", false, 5, true},
+               {"proven", false, 5},
                {"missed", true, 8},
                {"lost", true, 2},
                {"max lateness", true, 7},

@@ -59,7 +59,7 @@ CLI::Option *add_list(CLI::App &app, const std::string &name, std::vector<Value>
 }  // namespace
 
 PlanOptions::PlanOptions(CLI::App &app) {
-  app.add_option("PLAN", file_, "Plan (YAML, see docs/experiments.md); options override it")->type_name("FILE");
+  app.add_option("PLAN", file_, "Plan (YAML, see docs/experiments.md); options override it")->type_name("PLAN");
   add_points(app);
   add_workloads(app);
 }

@@ -43,7 +43,7 @@ int show(const Study &study, const StudyOutput &output, Console &console) {
         output.folder.empty() ? std::vector<std::string>{} : experiment::read_runs({output.folder});
     console.print(study.json(runs));
   } else {
-    console.print(study.describe(console.out_traits()));
+    console.say(study.describe(console.out_traits()));
     if (!output.folder.empty()) console.print("\nOpen these files:\n" + study.files(output.folder));
   }
   return study.judge(output.folder, console);
@@ -199,8 +199,8 @@ class StudyRun {
     if (!report) return tl::unexpected<Diagnostics>(report.error());
     if (report->silent > 0 && !InterruptGuard::interrupted()) {
       progress_.clear();
-      console_.warn(fmt::format("{} of {} ranks no longer answer: what they had not finished was done again",
-                                report->silent, ranks_->size()));
+      console_.warn(fmt::format("{} of {} ranks no longer answer: what they had not finished was done again ({} {})",
+                                report->silent, ranks_->size(), format_count(report->repeated), study_.units_are()));
     }
     return {};
   }

@@ -113,7 +113,7 @@ class FactorialStudy final : public Study {
 Action add_factorial(CLI::App &app) {
   const auto file = std::make_shared<std::string>();
   const auto settings = std::make_shared<StudySettings>();
-  app.add_option("PLAN", *file, "Plan (YAML, see docs/experiments.md)")->type_name("FILE")->required();
+  app.add_option("PLAN", *file, "Plan (YAML, see docs/experiments.md)")->type_name("PLAN")->required();
   const auto program = std::make_shared<std::string>();
   app.add_option("--run-workload", *program,
                  "Program run_workload of redag_rclcpp_lab, for 'world: ros2' (default: 'ros2 run redag_rclcpp_lab "

@@ -85,13 +85,13 @@ std::string combination_table(const Factorial &factorial, const FactorialResults
 // Returns for each workload and executor the mean over all combinations, and the best and the worst one.
 std::string range_table(const Factorial &factorial, const FactorialResults &results, const StreamTraits &traits) {
   Table table({{"workload", false, 100},
-               {"executor", false, 1000, true},
+               {"executor", false, 1000},
                {"combinations", true, 100},
                {"mean missed", true, 900},
                {"least", true, 800},
-               {"at", false, 300},
+               {.title = "at", .importance = 300, .prose = true},
                {"most", true, 800},
-               {"at", false, 300}});
+               {.title = "at", .importance = 300, .prose = true}});
   for (std::uint32_t w = 0; w < factorial.plan().workloads.size(); ++w) {
     for (std::uint32_t e = 0; e < factorial.plan().executors.size(); ++e) {
       std::vector<std::pair<double, const FactorialRow *>> rows;
@@ -133,8 +133,7 @@ std::string range_table(const Factorial &factorial, const FactorialResults &resu
 
 std::string effects_table(const Factorial &factorial, const std::vector<FactorialEffects> &all,
                           const StreamTraits &traits) {
-  Table table(
-      {{"workload", false, 100}, {"executor", false, 1000, true}, {"what", false, 900, true}, {"explains", true, 900}});
+  Table table({{"workload", false, 100}, {"executor", false, 1000}, {"what", false, 900}, {"explains", true, 900}});
   bool any = false;
   for (const FactorialEffects &one : all) {
     if (one.effects.variance <= 0) continue;

@@ -135,7 +135,7 @@ class Reporting {
     if (options_.json) {
       console_.note(text);
     } else {
-      console_.print(text);
+      console_.say(text);
     }
     return kExitOk;
   }
@@ -169,7 +169,7 @@ int write_page(const Options &options, const fs::path &folder, const std::string
   if (options.json) {
     console.note(words);
   } else {
-    console.print(words);
+    console.say(words);
   }
   return kExitOk;
 }
@@ -242,6 +242,7 @@ Action add_report(CLI::App &app) {
   app.add_option("DIR", options->places,
                  "Folders of recorded runs (--out of run, simulate, compare), at any depth; or one folder of 'redag "
                  "experiment'")
+      ->type_name("RESULT")
       ->required();
   app.add_option("-o,--output", options->output, "File for the page (default: report.html in the first DIR)")
       ->type_name("FILE");

@@ -76,9 +76,9 @@ std::optional<experiment::UnitCost> measure(const Study &study, Duration effort,
   }
   const double hours = cost->mean * static_cast<double>(study.unit_count()) / 1e9 / 3600;
   const auto time = [](double value) { return humanize_duration(std::llround(value)); };
-  console.print(fmt::format("{} {}, {} each (+- {}; {} of them measured): {:.3g} hours of a processor like this one\n",
-                            format_count(study.unit_count()), study.units_are(), time(cost->mean), time(cost->error),
-                            format_count(cost->measured), hours));
+  console.say(fmt::format("{} {}, {} each (+- {}; {} of them measured): {:.3g} hours of a processor like this one\n",
+                          format_count(study.unit_count()), study.units_are(), time(cost->mean), time(cost->error),
+                          format_count(cost->measured), hours));
   return *cost;
 }
 
@@ -121,8 +121,8 @@ bool write_jobs(const Study &study, const Settings &settings, Console &console) 
     const double wanted = std::ceil(total / static_cast<double>(time));
     shards = static_cast<std::uint32_t>(std::clamp(wanted, 1.0, static_cast<double>(kMostShards)));
     time = std::max<Duration>(kSecond, std::llround(total / shards));
-    console.print(fmt::format("shards take about {} on {} processor{} each\n", humanize_duration(time), settings.cpus,
-                              settings.cpus == 1 ? "" : "s"));
+    console.say(fmt::format("shards take about {} on {} processor{} each\n", humanize_duration(time), settings.cpus,
+                            settings.cpus == 1 ? "" : "s"));
   }
   shards = static_cast<std::uint32_t>(std::min<std::uint64_t>(shards, study.unit_count()));
   std::error_code failed;
@@ -140,7 +140,7 @@ bool write_jobs(const Study &study, const Settings &settings, Console &console) 
   for (const experiment::SlurmScript &script : scripts) {
     if (!write(folder, script, console)) return false;
   }
-  console.print(fmt::format("{}: {} shard{}, and a job that merges them\n", folder, shards, shards == 1 ? "" : "s"));
+  console.say(fmt::format("{}: {} shard{}, and a job that merges them\n", folder, shards, shards == 1 ? "" : "s"));
   return true;
 }
 
@@ -162,7 +162,7 @@ int submit(const Settings &settings, Console &console) {
     return kExitBad;
   }
   if (fs::exists(script)) {
-    console.print(fmt::format("{} holds the jobs of this plan already; they go on where they ended\n", folder));
+    console.say(fmt::format("{} holds the jobs of this plan already; they go on where they ended\n", folder));
   } else if (!write_jobs(*study, settings, console)) {
     return kExitBad;
   }
@@ -175,7 +175,7 @@ int submit(const Settings &settings, Console &console) {
 
 Action add_cost(CLI::App &app) {
   const auto settings = std::make_shared<Settings>();
-  app.add_option("PLAN", settings->plan, "Plan of an experiment (YAML)")->type_name("FILE")->required();
+  app.add_option("PLAN", settings->plan, "Plan of an experiment (YAML)")->type_name("PLAN")->required();
   add_sample(app, *settings);
   app.footer(
       "Examples:\n"
@@ -189,7 +189,7 @@ Action add_cost(CLI::App &app) {
 
 Action add_submit(CLI::App &app) {
   const auto settings = std::make_shared<Settings>();
-  app.add_option("PLAN", settings->plan, "Plan of an experiment (YAML)")->type_name("FILE")->required();
+  app.add_option("PLAN", settings->plan, "Plan of an experiment (YAML)")->type_name("PLAN")->required();
   app.add_option("--out", settings->output.folder,
                  "Folder for the jobs and all results, which all nodes can reach; the same folder goes on")
       ->type_name("DIR")

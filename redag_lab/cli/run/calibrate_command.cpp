@@ -130,7 +130,11 @@ int calibrate(const Options &options, Console &console) {
         "this process may not use SCHED_FIFO: only ordinary threads were measured, as preemption 'cooperative' and "
         "'none' use them");
   }
-  console.print(options.json ? to_text(to_json(calibration)) : describe(calibration, console.out_traits()));
+  if (options.json) {
+    console.print(to_text(to_json(calibration)));
+  } else {
+    console.say(describe(calibration, console.out_traits()));
+  }
   if (const Result<void> written = write_text(options.out, to_yaml(calibration)); !written) {
     console.note(written.error());
     return kExitBad;
@@ -140,7 +144,7 @@ int calibrate(const Options &options, Console &console) {
   if (options.json) {
     console.note(message);
   } else {
-    console.print(message);
+    console.say(message);
   }
   return kExitOk;
 }

@@ -21,13 +21,20 @@ struct Options {
   bool json = false;
 };
 
-Json describe_run(const trace::Trace &trace) {
-  return Json{{"workload", trace.info.workload.name},
-              {"executor", trace.info.executor},
-              {"preemption", trace.info.preemption},
-              {"driver", trace::to_string(trace.info.driver)},
-              {"end_ns", trace.info.end},
-              {"events", trace.events.size()}};
+Json describe_run(const trace::RunInfo &run, std::uint64_t events) {
+  return Json{{"workload", run.workload.name},          {"executor", run.executor}, {"preemption", run.preemption},
+              {"driver", trace::to_string(run.driver)}, {"end_ns", run.end},        {"events", events}};
+}
+
+// Reads a file once, some events at a time.
+Result<metrics::CheckReport> check_events(trace::EventsReader &reader) {
+  const trace::RunInfo &run = reader.info();
+  metrics::TraceChecker checker(run, metrics::rules_for(run));
+  const Result<void> read = reader.visit([&](std::span<const JobEvent> events) {
+    if (run.lost_events == 0) checker.add(events);
+  });
+  if (!read) return tl::unexpected<Diagnostics>(read.error());
+  return checker.finish(run.end, run.lost_events);
 }
 
 class Checking {
@@ -60,21 +67,28 @@ class Checking {
   }
 
   void check(const std::string &file) {
-    const Result<trace::Trace> trace = trace::read_trace(file);
-    if (!trace) {
-      report_unreadable(file, trace.error());
+    Result<trace::EventsReader> reader = trace::EventsReader::open(file);
+    if (!reader) {
+      report_unreadable(file, reader.error());
       return;
     }
-    const metrics::CheckReport report = metrics::check_trace(*trace, metrics::rules_for(trace->info));
-    lawful_ = lawful_ && report.ok();
+    const Result<metrics::CheckReport> report = check_events(*reader);
+    if (!report) {
+      report_unreadable(file, report.error());
+      return;
+    }
+    lawful_ = lawful_ && report->ok();
+    const trace::RunInfo &run = reader->info();
     if (options_.json) {
-      traces_.push_back(
-          Json{{"file", file}, {"ok", report.ok()}, {"run", describe_run(*trace)}, {"check", to_json(report)}});
+      traces_.push_back(Json{{"file", file},
+                             {"ok", report->ok()},
+                             {"run", describe_run(run, reader->events())},
+                             {"check", to_json(*report)}});
       return;
     }
-    console_.print(fmt::format("{}: {}, {}, {}, {} events\n  {}", file, trace->info.executor, trace->info.preemption,
-                               humanize_duration(trace->info.end - trace->info.start),
-                               format_count(trace->events.size()), describe_check(report, console_.out_traits())));
+    console_.say(fmt::format("{}: {}, {}, {}, {} events\n  {}", file, run.executor, run.preemption,
+                             humanize_duration(run.end - run.start), format_count(reader->events()),
+                             describe_check(*report, console_.out_traits())));
   }
 
   const Options &options_;
@@ -88,7 +102,9 @@ class Checking {
 
 Action add_check_trace(CLI::App &app) {
   auto options = std::make_shared<Options>();
-  app.add_option("PLACE", options->places, "Traces (events.jsonl), or folders that hold traces at any depth")
+  app.add_option("PLACE", options->places,
+                 "Traces (events.redag, events.jsonl), or folders that hold traces at any depth")
+      ->type_name("RESULT")
       ->required();
   app.add_flag("--json", options->json, "Write the verdicts as one JSON document");
   return [options](Console &console) { return Checking(*options, console).run(); };

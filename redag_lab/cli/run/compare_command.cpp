@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <memory>
 
+#include "redag/trace/events_file.hpp"
 #include "redag_lab/cli/run/comparison_report.hpp"
 #include "redag_lab/cli/run/run_arguments.hpp"
 #include "redag_lab/cli/run/run_report.hpp"
@@ -81,7 +82,7 @@ class Comparing {
     // Virtual time repeats exactly. Only another seed makes another repetition.
     if (options_.simulate) options.seed += repetition;
     progress_.set_label(fmt::format("{} {}/{}", results.variant.name, repetition + 1, repetitions_));
-    const Result<lab::Session> session =
+    Result<lab::Session> session =
         lab::run_session(workload_, results.variant, options, progress_hook(progress_, workload_, options.duration));
     progress_.clear();
     if (!session) {
@@ -99,16 +100,17 @@ class Comparing {
     return write(*session, results.variant, repetition);
   }
 
-  bool write(const lab::Session &session, const lab::Variant &variant, std::uint32_t repetition) {
+  bool write(lab::Session &session, const lab::Variant &variant, std::uint32_t repetition) {
     if (options_.run.folder.empty()) return true;
     const std::string folder = fmt::format("{}/{}/repetition-{}", options_.run.folder, variant.name, repetition + 1);
     if (const Result<void> made = prepare_folder(folder, options_.run.force); !made) {
       console_.note(made.error());
       return false;
     }
-    const Diagnostics problems = write_session(session, folder);
-    console_.note(problems);
-    all_written_ = all_written_ && problems.empty();
+    const WrittenFiles written = write_session(session, files_options(options_.run, folder));
+    console_.note(written.problems);
+    all_written_ = all_written_ && written.problems.empty();
+    has_picture_ = written.has_picture;
     return true;
   }
 
@@ -138,7 +140,11 @@ class Comparing {
       for (const std::string &warning : results.warnings) console_.warn(results.variant.name + ": " + warning);
     }
     const std::string document = to_text(to_json(compared));
-    console_.print(options_.run.json ? document : describe(compared, console_.out_traits()));
+    if (options_.run.json) {
+      console_.print(document);
+    } else {
+      console_.say(describe(compared, console_.out_traits()));
+    }
     const std::string &folder = options_.run.folder;
     if (!folder.empty()) {
       for (const auto &[name, text] :
@@ -159,20 +165,26 @@ class Comparing {
 
   void say_what_was_written(const std::string &folder) {
     const std::string first = fmt::format("{}/{}/repetition-1", folder, results_.front().variant.name);
-    const std::string text = fmt::format(
+    std::string text = fmt::format(
         "\n"
         "Open these files:\n"
-        "  {0}/comparison.json, comparison.csv\n"
-        "      this comparison, with every repetition\n"
-        "  {1}/trace.json\n"
-        "      the schedule, for https://ui.perfetto.dev\n"
-        "  {1}/jobs.csv, summary.json, events.jsonl\n"
+        "  {}/comparison.json, comparison.csv\n"
+        "      this comparison, with every repetition\n",
+        folder);
+    if (has_picture_) {
+      text += fmt::format(
+          "  {}/trace.pftrace\n"
+          "      the schedule, for https://ui.perfetto.dev\n",
+          first);
+    }
+    text += fmt::format(
+        "  {}/jobs.csv, summary.json, {}\n"
         "      every job; the folders beside it hold the other executors\n",
-        folder, first);
+        first, options_.run.events_as_text ? trace::kEventsTextFile : trace::kEventsFile);
     if (options_.run.json) {
       console_.note(text);
     } else {
-      console_.print(text);
+      console_.say(text);
     }
   }
 
@@ -185,6 +197,7 @@ class Comparing {
   std::vector<lab::ExecutorResults> results_;
   std::vector<std::string> warnings_;
   bool all_written_ = true;
+  bool has_picture_ = false;
 };
 
 int compare(const Options &options, Console &console) {
@@ -233,7 +246,7 @@ Action add_compare(CLI::App &app) {
   app.add_option("--executors", options->executors,
                  "Executors to compare: redag, redag-none, redag-cooperative, redag-os, mte, ste, static, events, cbg; "
                  "with -fifo (mte-fifo, ...) on real-time threads")
-      ->type_name("LIST")
+      ->type_name(type_name({"LIST", lab::variant_names()}))
       ->capture_default_str();
   add_count(app, "--repeat", options->repeat, {1, kMostRepetitions},
             "Repetitions, in which the executors take turns; by default 3, or 1 with --simulate, where they take seeds "

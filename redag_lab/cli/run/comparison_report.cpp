@@ -64,18 +64,10 @@ Json row_json(const lab::ExecutorResults &results, const std::string &name, std:
   return json;
 }
 
-// Quotes a field of a CSV file (RFC 4180).
-std::string quoted(const std::string &text) {
-  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
-  std::string result = "\"";
-  for (const char c : text) result += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return result + "\"";
-}
-
 std::string comparison_table(const lab::Comparison &comparison, const StreamTraits &terminal) {
   const bool is_repeated = comparison.executors.front().repetitions.size() > 1;
   std::vector<Column> columns = {
-      {"DAG", false, 9}, {"executor", false, 9, true}, {"jobs", true, 7}, {"late", true, 2}, {"missed", true, 8}};
+      {"DAG", false, 9}, {"executor", false, 9}, {"jobs", true, 7}, {"late", true, 2}, {"missed", true, 8}};
   if (is_repeated) columns.push_back({"missed, by repetition", true, 3});
   columns.insert(columns.end(), {{"p50", true, 4}, {"p95", true, 1}, {"p99", true, 6}, {"max", true, 5}});
   Table table(std::move(columns));
@@ -223,8 +215,8 @@ std::string to_csv(const lab::Comparison &comparison) {
         const metrics::DagSummary &seen = results.repetitions[r][dag];
         const metrics::JobCounts &jobs = seen.jobs;
         text += fmt::format("{},{},{},{},{},{},{},{},{},{:.9g},{:.9g},{}", results.variant.name,
-                            quoted(comparison.dags[dag]), r + 1, jobs.released, jobs.finished, jobs.late, jobs.skipped,
-                            jobs.aborted, jobs.missed(), jobs.miss_ratio(), jobs.miss_ratio_with_lost(),
+                            metrics::csv_quoted(comparison.dags[dag]), r + 1, jobs.released, jobs.finished, jobs.late,
+                            jobs.skipped, jobs.aborted, jobs.missed(), jobs.miss_ratio(), jobs.miss_ratio_with_lost(),
                             seen.end_to_end.late);
         const metrics::Distribution &response = seen.end_to_end.response;
         text += response.count == 0

@@ -65,22 +65,22 @@ int recover(const Options &options, Console &console) {
     return kExitBad;
   }
   console.note(warnings_of(*recovered));
-  const lab::Session session = lab::session_of(std::move(recovered->trace));
+  lab::Session session = lab::session_of(std::move(recovered->trace));
   if (options.json) {
     console.print(to_text(to_json(session)));
   } else {
-    console.print(describe(session, console.out_traits()));
+    console.say(describe(session, console.out_traits()));
   }
-  Diagnostics problems = write_session(session, folder);
+  const WrittenFiles written = write_session(session, {.folder = folder});
+  Diagnostics problems = written.problems;
   if (problems.empty() && !options.keep) {
     if (const Result<void> removed = trace::remove_flight_record(record); !removed) problems = removed.error();
   }
   console.note(problems);
   if (!problems.empty()) return kExitBad;
-  const std::string message =
-      fmt::format("recovered {} events into {}/: summary.json, jobs.csv, events.jsonl, trace.json\n",
-                  format_count(session.events), folder);
-  options.json ? console.note(message) : console.print(message);
+  const std::string message = fmt::format("recovered {} events into {}/: {}\n{}", format_count(session.events), folder,
+                                          written.names, written.no_picture);
+  options.json ? console.note(message) : console.say(message);
   return kExitOk;
 }
 
@@ -89,6 +89,7 @@ int recover(const Options &options, Console &console) {
 Action add_recover(CLI::App &app) {
   auto options = std::make_shared<Options>();
   app.add_option("DIR", options->place, "The --out folder of a killed run, or its record (then with --out)")
+      ->type_name("DIR")
       ->required();
   app.add_option("--out", options->folder, "Folder for the results, instead of DIR; created if missing")
       ->type_name("DIR");

@@ -63,7 +63,9 @@ void add_overhead_arguments(CLI::App &app, RunArguments &arguments, const std::s
 }
 
 void add_workload_arguments(CLI::App &app, RunArguments &arguments) {
-  app.add_option("FILE", arguments.file, "Workload file (YAML); - reads standard input")->required();
+  app.add_option("FILE", arguments.file, "Workload file (YAML); - reads standard input")
+      ->type_name("WORKLOAD")
+      ->required();
   add_duration(app, "--duration", arguments.duration, "Length of the run: the time in which jobs are released");
   add_duration(app, "--warm-up", arguments.warm_up, "Do not count jobs released in this time at the start", true);
   add_duration(app, "--warmup", arguments.warm_up, "Former name of --warm-up", true)->group("");  // not in --help
@@ -82,7 +84,18 @@ void add_result_arguments(CLI::App &app, RunArguments &arguments) {
       ->group(kResultGroup);
   app.add_flag("--check", arguments.check, "Exit with status 1 if a deadline was missed")->group(kResultGroup);
   add_count(app, "--max-events", arguments.max_events, {1, kMaxEvents},
-            "Number of events to check and write, at 32 bytes of memory each; later events count in the summary only")
+            "Number of events to check and write; later events count in the summary only")
+      ->group(kResultGroup);
+  const Choices<bool> forms{{"redag", false}, {"jsonl", true}};
+  add_choice(app, "--events", arguments.events_as_text, forms,
+             "Form of the events: events.redag (compressed), or events.jsonl (text)")
+      ->needs(folder)
+      ->group(kResultGroup);
+  const Choices<lab::Picture> pictures{
+      {"auto", lab::Picture::Auto}, {"always", lab::Picture::Always}, {"never", lab::Picture::Never}};
+  add_choice(app, "--picture", arguments.picture, pictures,
+             "Write trace.pftrace, the schedule as a picture (auto: of runs with at most 500 000 events)")
+      ->needs(folder)
       ->group(kResultGroup);
 }
 
@@ -238,6 +251,10 @@ std::optional<lab::SessionOptions> session_options(const RunArguments &arguments
     }
   }
   return options;
+}
+
+lab::FilesOptions files_options(const RunArguments &arguments, const std::string &folder) {
+  return {.folder = folder, .events_as_text = arguments.events_as_text, .picture = arguments.picture};
 }
 
 lab::ProgressHook progress_hook(Progress &progress, const Workload &workload, Duration duration) {

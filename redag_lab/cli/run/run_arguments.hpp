@@ -33,7 +33,7 @@ struct RunArguments {
   std::uint64_t seed = 1;
   sim::Overheads overheads;
   std::optional<Calibration> calibration;  // --overheads
-  std::uint64_t max_events = std::uint64_t{1} << 22U;
+  std::uint64_t max_events = lab::kMostKeptEvents;
   std::string cpus;
   bool lock_memory = false;
   bool realtime_threads = false;
@@ -42,6 +42,8 @@ struct RunArguments {
   bool live = false;
   bool json = false;
   std::string folder;
+  bool events_as_text = false;
+  lab::Picture picture = lab::Picture::Auto;
   bool kernel = false;
   bool flight = false;  // records the run in `folder` while it runs
   std::uint32_t flight_mib = static_cast<std::uint32_t>(trace::FlightOptions{}.most_bytes >> 20U);
@@ -80,6 +82,9 @@ void add_thread_arguments(CLI::App &app, RunArguments &arguments);
                                                                  Duration default_duration, Console &console);
 
 /// Draws `progress` over a session of `duration`: the time, and the DAGs with misses.
+/// The files that a run writes into `folder`; "": none.
+[[nodiscard]] lab::FilesOptions files_options(const RunArguments &arguments, const std::string &folder);
+
 [[nodiscard]] lab::ProgressHook progress_hook(Progress &progress, const Workload &workload, Duration duration);
 
 }  // namespace redag::cli

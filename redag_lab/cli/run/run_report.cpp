@@ -6,17 +6,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <memory>
 #include <numeric>
+#include <utility>
 
 #include "redag/base/text.hpp"
-#include "redag/trace/events_file.hpp"
-#include "redag_analysis/metrics/jobs.hpp"
-#include "redag_analysis/metrics/jobs_csv.hpp"
-#include "redag_analysis/metrics/perfetto.hpp"
 #include "redag_analysis/metrics/summary_json.hpp"
 #include "redag_analysis/metrics/verdict.hpp"
 #include "redag_analysis/text/table.hpp"
 #include "redag_lab/cli/run/bound_report.hpp"
+#include "redag_lab/run/picture.hpp"
 
 namespace redag::cli {
 namespace {
@@ -206,7 +205,7 @@ std::string describe(const lab::Session &session, const StreamTraits &terminal, 
   text += describe_check(session.check, terminal);
   if (session.cut_at) {
     text += fmt::format("events checked and kept: the first {}, {} of {}; --max-events raises this limit\n",
-                        format_count(session.trace.events.size()), humanize_duration(*session.cut_at),
+                        format_count(session.checked), humanize_duration(*session.cut_at),
                         humanize_duration(session.info.end));
   }
   return text;
@@ -242,19 +241,47 @@ Json to_json(const lab::Session &session) {
   return document;
 }
 
-Diagnostics write_session(const lab::Session &session, const std::string &folder) {
-  Diagnostics problems;
-  const auto keep = [&problems](const Result<void> &written) {
-    if (!written) problems.insert(problems.end(), written.error().begin(), written.error().end());
+WrittenFiles write_session(lab::Session &session, const lab::FilesOptions &options) {
+  WrittenFiles written;
+  const auto keep = [&written](const Diagnostics &problems) {
+    written.problems.insert(written.problems.end(), problems.begin(), problems.end());
   };
-  const trace::Trace &trace = session.trace;
-  keep(metrics::write_summary(folder + "/summary.json", session.summary, session.info));
-  keep(metrics::write_jobs_csv(folder + "/jobs.csv", trace.info.workload,
-                               metrics::fold_jobs(trace.info.workload, trace.events)));
-  keep(metrics::write_perfetto(folder + "/trace.json", trace));
-  keep(trace::write_trace(folder + "/events.jsonl", trace));
-  if (session.kernel) keep(metrics::write_kernel_record(folder + "/kernel.jsonl", *session.kernel));
-  return problems;
+  const auto keep_if_failed = [&keep](const Result<void> &result) {
+    if (!result) keep(result.error());
+  };
+  if (!session.files) {
+    Result<lab::RunFiles> files = lab::RunFiles::create(options, session.trace.info);
+    if (files) {
+      files->add(session.trace.events);
+      session.files = std::make_unique<lab::RunFiles>(*std::move(files));
+    } else {
+      keep(files.error());
+    }
+  }
+  keep_if_failed(metrics::write_summary(options.folder + "/summary.json", session.summary, session.info));
+  if (session.files) {
+    keep(session.files->commit(session.cut_at.value_or(session.info.end), session.info.lost_events));
+    written.names = "summary.json, " + session.files->names();
+    written.has_picture = session.files->has_picture();
+    if (session.files->lacks_picture()) {
+      written.no_picture = fmt::format(
+          "no trace.pftrace: the run has more than {0} events\n"
+          "('redag events {1} --format perfetto -o {1}/trace.pftrace' makes one)\n",
+          format_count(lab::kMostPicturedEvents), options.folder);
+    }
+  }
+  if (session.kernel) {
+    keep_if_failed(metrics::write_kernel_record(options.folder + "/kernel.jsonl", *session.kernel));
+    written.names += ", kernel.jsonl";
+    // What the kernel did is known only now.
+    if (written.has_picture && written.problems.empty()) {
+      Result<trace::EventsReader> events = trace::EventsReader::open(session.files->events_path());
+      keep_if_failed(
+          events ? lab::draw_picture(*events, session.files->picture_path(), &*session.kernel, [] { return false; })
+                 : tl::unexpected<Diagnostics>(std::move(events.error())));
+    }
+  }
+  return written;
 }
 
 }  // namespace redag::cli

@@ -28,8 +28,15 @@ struct ReportOptions {
 [[nodiscard]] Json to_json(const lab::Session &session);
 [[nodiscard]] Json to_json(const metrics::CheckReport &check);
 
-/// Writes jobs.csv, summary.json, trace.json and events.jsonl into an existing folder, and continues after a failure.
-/// Returns the errors.
-[[nodiscard]] Diagnostics write_session(const lab::Session &session, const std::string &folder);
+struct WrittenFiles {
+  Diagnostics problems;  // what could not be written
+  std::string names;     // "summary.json, jobs.csv, events.redag, trace.pftrace"
+  bool has_picture = false;
+  std::string no_picture;  // why there is no trace.pftrace; empty: there is one, or none was wanted
+};
+
+/// Completes session.files, or writes such files of session.trace, and adds summary.json and kernel.jsonl. The folder
+/// must exist. Continues after a failure.
+[[nodiscard]] WrittenFiles write_session(lab::Session &session, const lab::FilesOptions &options);
 
 }  // namespace redag::cli

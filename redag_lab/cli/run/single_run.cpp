@@ -48,12 +48,14 @@ int run_once(const RunArguments &arguments, const std::string &executor, trace::
     return kExitBad;
   }
   const Duration usual = simulated ? lab::sensible_duration(*workload) : kThreadsDuration;
-  const std::optional<lab::SessionOptions> options = session_options(arguments, driver, usual, console);
+  std::optional<lab::SessionOptions> options = session_options(arguments, driver, usual, console);
   if (!options) return kExitBad;
+  options->files = files_options(arguments, arguments.folder);
+  options->keep_trace = false;
 
   if (const auto busy = simulated ? std::nullopt : lab::busy_machine_warning()) console.warn(*busy);
   const InterruptGuard guard;  // covers writing the results too
-  const Result<lab::Session> session = run_interruptibly(*workload, *variant, *options, console);
+  Result<lab::Session> session = run_interruptibly(*workload, *variant, *options, console);
   if (!session) {
     console.note(session.error());
     return kExitBad;
@@ -62,24 +64,22 @@ int run_once(const RunArguments &arguments, const std::string &executor, trace::
   if (arguments.json) {
     console.print(to_text(to_json(*session)));
   } else {
-    console.print(describe(*session, console.out_traits(), ReportOptions{arguments.all_tasks}));
+    console.say(describe(*session, console.out_traits(), ReportOptions{arguments.all_tasks}));
   }
   bool written = true;
   if (!arguments.folder.empty()) {
-    Diagnostics problems = write_session(*session, arguments.folder);
+    WrittenFiles files = write_session(*session, options->files);
     // The flight record remains while results are missing.
-    if (problems.empty() && !options->flight.empty()) {
+    if (files.problems.empty() && !options->flight.empty()) {
       if (const Result<void> removed = trace::remove_flight_record(options->flight); !removed)
-        problems = removed.error();
+        files.problems = removed.error();
     }
-    console.note(problems);
-    written = problems.empty();
-    const std::string message = fmt::format(
-        "wrote {}/: summary.json, jobs.csv, events.jsonl, trace.json{}\n"
-        "(open trace.json in https://ui.perfetto.dev)\n",
-        arguments.folder, session->kernel ? ", kernel.jsonl" : "");
+    console.note(files.problems);
+    written = files.problems.empty();
+    std::string message = fmt::format("wrote {}/: {}\n", arguments.folder, files.names) + files.no_picture;
+    if (files.has_picture) message += "(open trace.pftrace in https://ui.perfetto.dev)\n";
     if (written && arguments.json) console.note(message);
-    if (written && !arguments.json) console.print(message);
+    if (written && !arguments.json) console.say(message);
   }
   if (!written) return kExitBad;
   const bool no =

@@ -85,7 +85,7 @@ int validate_files(const Options &options, Console &console) {
     console.note(found);
     if (ok) {
       const std::string verdict = tinted("ok", Tint::Good, console.out_traits().colour);
-      console.print(fmt::format("{}: {}: {}\n", file, verdict, describe(facts_of(loaded->workload))));
+      console.say(fmt::format("{}: {}: {}\n", file, verdict, describe(facts_of(loaded->workload))));
     } else if (loaded) {
       console.error(fmt::format("{}: {} not accepted by --strict", file, plural(found.size(), "warning")));
     }
@@ -98,7 +98,9 @@ int validate_files(const Options &options, Console &console) {
 
 Action add_validate(CLI::App &app) {
   auto options = std::make_shared<Options>();
-  app.add_option("FILE", options->files, "Workload files (YAML); - reads standard input")->required();
+  app.add_option("FILE", options->files, "Workload files (YAML); - reads standard input")
+      ->type_name("WORKLOAD")
+      ->required();
   app.add_flag("--strict", options->strict, "Treat warnings as errors");
   app.add_flag("--json", options->json, "Write the findings as one JSON document");
   return [options](Console &console) { return validate_files(*options, console); };

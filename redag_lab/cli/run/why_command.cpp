@@ -51,23 +51,17 @@ class Explaining {
 
  private:
   std::optional<trace::Trace> read() {
-    const Result<std::vector<std::string>> files = find_traces(options_.place);
-    if (!files) {
-      console_.note(files.error());
+    const Result<std::string> file = find_trace(options_.place);
+    if (!file) {
+      console_.note(file.error());
       return std::nullopt;
     }
-    if (files->size() > 1) {
-      console_.error(
-          fmt::format("{} holds {} runs", options_.place, format_count(files->size())),
-          fmt::format("name one of them, such as {}", std::filesystem::path(files->front()).parent_path().string()));
-      return std::nullopt;
-    }
-    Result<trace::Trace> trace = trace::read_trace(files->front());
+    Result<trace::Trace> trace = trace::read_trace(*file);
     if (!trace) {
       console_.note(trace.error());
       return std::nullopt;
     }
-    Result<std::optional<metrics::KernelRecord>> kernel = metrics::read_kernel_record_of(files->front(), trace->info);
+    Result<std::optional<metrics::KernelRecord>> kernel = metrics::read_kernel_record_of(*file, trace->info);
     if (!kernel) {
       console_.note(kernel.error());
       return std::nullopt;
@@ -88,11 +82,11 @@ class Explaining {
       console_.print(to_text(to_json(overview, investigation.run())));
       return kExitOk;
     }
-    console_.print(describe(overview, investigation.run(), console_.out_traits(), options_.all ? 0 : kRows));
+    console_.say(describe(overview, investigation.run(), console_.out_traits(), options_.all ? 0 : kRows));
     if (overview.explanations.empty()) return kExitOk;
     const metrics::JobRecord &worst = overview.explanations.front().job;
-    console_.print(fmt::format("'redag why {} {}#{}' explains one job\n", options_.place,
-                               trace::task_name(investigation.run().workload, worst.task), worst.number));
+    console_.say(fmt::format("'redag why {} {}#{}' explains one job\n", options_.place,
+                             trace::task_name(investigation.run().workload, worst.task), worst.number));
     return kExitOk;
   }
 
@@ -105,8 +99,11 @@ class Explaining {
     const metrics::Explanation &one = overview.explanations.front();
     overview.misses = one.miss == metrics::Miss::None ? 0 : 1;
     overview.jobs = 1;
-    console_.print(options_.json ? to_text(to_json(overview, investigation.run()))
-                                 : describe(one, investigation.run(), console_.out_traits()));
+    if (options_.json) {
+      console_.print(to_text(to_json(overview, investigation.run())));
+    } else {
+      console_.say(describe(one, investigation.run(), console_.out_traits()));
+    }
     return kExitOk;
   }
 
@@ -160,7 +157,8 @@ class Explaining {
 
 Action add_why(CLI::App &app) {
   auto options = std::make_shared<WhyOptions>();
-  app.add_option("RESULT", options->place, "Folder of a recorded run (--out of run, simulate), or its events.jsonl")
+  app.add_option("RESULT", options->place, "Folder of a recorded run (--out of run, simulate), or its events.redag")
+      ->type_name("RESULT")
       ->required();
   CLI::Option *job = app.add_option("JOB", options->job,
                                     "Job to explain: dag.task#12, or dag.task for its worst job (default: all misses)");

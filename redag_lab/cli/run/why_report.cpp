@@ -40,16 +40,15 @@ std::string line(const std::string &since, Duration length, Duration whole, cons
 Tint tint_of(const Explanation &one) { return one.miss == metrics::Miss::None ? Tint::Good : Tint::Bad; }
 
 // How late a job was, or that it was lost.
-std::string lateness(const Explanation &one, const Workload &workload) {
+std::string lateness(const Explanation &one) {
   if (one.miss == metrics::Miss::Lost) return to_string(one.job.reason);
-  const Duration deadline = one.end_to_end ? workload.dags[flatten(workload)[one.job.task.value].dag.value].deadline
-                                           : one.job.deadline - one.job.release;
-  const Duration late = one.length() - deadline;
+  const Duration late = one.lateness();
   return (late < 0 ? "-" : "") + humanize_duration(late < 0 ? -late : late);
 }
 
 std::string causes_table(const std::vector<Culprit> &causes, const trace::RunInfo &run, const StreamTraits &terminal) {
-  Table table({{"cause", false, 9}, {"jobs", true, 5}, {"mainly", true, 8}, {"time", true, 7}});
+  Table table(
+      {{.title = "cause", .importance = 9, .prose = true}, {"jobs", true, 5}, {"mainly", true, 8}, {"time", true, 7}});
   std::size_t shown = 0;
   for (const Culprit &cause : causes) {
     if (shown++ == kMostCauses) break;
@@ -130,12 +129,15 @@ std::string describe(const WhyOverview &overview, const trace::RunInfo &run, con
   if (overview.misses > count) text += fmt::format("(explained: the worst {})\n", format_count(count));
   if (count == 0) return text;
   text += "\n" + causes_table(metrics::culprits_of(overview.explanations), run, terminal) + "\n";
-  Table table({{"job", false, 9, true}, {"late or lost", true, 8}, {"main cause", false, 7}, {"share", true, 6}});
+  Table table({{"job", false, 9},
+               {"late or lost", true, 8},
+               {.title = "main cause", .importance = 7, .prose = true},
+               {"share", true, 6}});
   for (std::size_t i = 0; i < count && (most == 0 || i < most); ++i) {
     const Explanation &one = overview.explanations[i];
     const std::vector<Culprit> culprits = metrics::culprits_of(one);
     table.add({{metrics::job_name(run.workload, id_of(one))},
-               {lateness(one, run.workload), tint_of(one)},
+               {lateness(one), tint_of(one)},
                {culprits.empty() ? "lost at its release" : metrics::describe(culprits.front(), run.workload)},
                {culprits.empty() ? "-" : format_percent(share_of(culprits.front().time, one.length()))}});
   }

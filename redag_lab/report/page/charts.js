@@ -2,16 +2,24 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // ECharts on this page: one theme, light or dark. Each chart is redrawn when theme, width or data change, and can be
-// saved as PNG and SVG.
+// saved as PNG and SVG. Its data can be read as a table.
 
-const PALETTE = {
-  light: ['#0b62c4', '#d9730d', '#2a8f4d', '#8e44ad', '#c2385a', '#0e8c99', '#8c6d1f', '#5a6270'],
-  dark: ['#5aa9ff', '#ff9f45', '#5fd08a', '#c58af0', '#ff7f9e', '#4fd0dc', '#d9b95a', '#a9b4c0'],
+// What a colour means, here and in page.css. Nothing is told by colour alone: marks, names, dashes and patterns say the
+// same. No hue is near the red of misses, the green of what is met, or the orange of lost time, and all differ for
+// people with deuteranopia or protanopia, too.
+const HUES = {
+  light: ['#1f66c1', '#922173', '#05a1c8', '#463b41', '#a77afa', '#9d6d96', '#3c2c9f', '#959389'],
+  dark: ['#6cb2ff', '#c53c94', '#29e8e7', '#e3d7c6', '#a464cd', '#d98db7', '#3c6eee', '#827069'],
 };
+const SHADES = {light: ['#23394e', '#5c7489', '#8496a6'], dark: ['#e4edf5', '#a2b4c4', '#71869a']};
+const DASHES = ['solid', 'dashed', 'dotted', [12, 4, 2, 4], [3, 3], [16, 6]];
+const PATTERNS = ['none', 'lines', 'dots'];
+
 const charts = [];
 const themed = [];   // functions to call when the theme changes
 let beforePrint = null;  // the state before printing, while printing
 let forced = null;  // 'light' or 'dark' if the reader or the printer chose it
+const isPrinting = () => beforePrint !== null;
 
 const systemDark = window.matchMedia('(prefers-color-scheme: dark)');
 const themeName = () => forced || (systemDark.matches ? 'dark' : 'light');
@@ -20,16 +28,73 @@ function theme() {
   const style = getComputedStyle(document.documentElement);
   const colour = (name) => style.getPropertyValue(`--${name}`).trim();
   return {
-    dark: themeName() === 'dark', palette: PALETTE[themeName()], ink: colour('ink'), soft: colour('soft'), line: colour('line'),
-    paper: colour('paper'), raised: colour('raised'), bad: colour('bad'), good: colour('good'), caution: colour('caution'),
+    dark: themeName() === 'dark', ink: colour('ink'), soft: colour('soft'), line: colour('line'), paper: colour('paper'), raised: colour('raised'),
+    missed: colour('missed'), met: colour('met'), delay: colour('delay'), hues: HUES[themeName()], shades: SHADES[themeName()],
   };
 }
-const colourOf = (t, index) => t.palette[index % t.palette.length];
+
+/** Returns the look of the i-th thing that is told apart by hue: {color, dash}. */
+const hueOf = (t, i) => ({color: t.hues[i % t.hues.length], dash: DASHES[Math.floor(i / t.hues.length) % DASHES.length]});
+
+/** Returns the look of the i-th thing that is told apart by shade and pattern: {color, dash, pattern}. */
+function shadeOf(t, i) {
+  const style = Math.floor(i / t.shades.length) % PATTERNS.length;
+  return {color: t.shades[i % t.shades.length], dash: DASHES[style], pattern: PATTERNS[style]};
+}
+
+/** Returns the fill of a bar with such a look, for ECharts. */
+function fillOf(t, {color, pattern}) {
+  const common = {color: t.paper, backgroundColor: color};
+  const decals = {lines: {...common, symbol: 'rect', dashArrayX: [1, 0], dashArrayY: [2, 4], rotation: Math.PI / 4},
+    dots: {...common, symbol: 'circle', symbolSize: 0.7, dashArrayX: [[5, 5], [0, 5, 5, 0]], dashArrayY: [5, 0]}};
+  return {color, decal: decals[pattern]};
+}
+
+/** Returns a square in such a look, for text. */
+const swatch = ({color, pattern = 'none'}) => element(`span.swatch.${pattern}`, {style: `--look:${color}`, 'aria-hidden': 'true'});
+
+/** Returns a name in its look. Long names break after a dot, a line or a slash. */
+const named = (look, name) => element('span.named', {}, swatch(look), ...breakable(name));
+
+/** Returns the list of what colours and lines mean. `hue` and `shade` name what they tell apart; null: nothing. */
+function colourKey(hue, shade) {
+  const mark = (kind) => element(`span.mark.${kind}`, {'aria-hidden': 'true'});
+  const many = (looks) => element('span', {}, ...looks.slice(0, 3).map(swatch));
+  const t = theme();
+  const rows = [
+    [mark('missed'), 'missed: late or lost, or a rule that was broken'], [mark('met'), 'met: no deadline missed, no rule broken'],
+    [mark('delay'), 'time in which a job did not execute'],
+    [mark('deadline'), 'dashed line: deadline'], [mark('bound'), 'dotted line: bound that the analysis proves'],
+    hue && [many(t.hues.map((_, i) => hueOf(t, i))), `hue: ${hue}`, t.hues], shade && [many(t.shades.map((_, i) => shadeOf(t, i))), `shade and pattern: ${shade}`, t.shades],
+  ];
+  return element('ul.key', {}, ...rows.filter(Boolean).map(([sign, text, looks]) => element('li', {'data-looks': looks && looks.join(' ')}, sign, text)));
+}
 
 function applyTheme() {
   document.documentElement.dataset.theme = themeName();
   themed.forEach((make) => make());
   charts.forEach((chart) => chart.draw());
+}
+
+const BUTTONS_WIDTH = 210;
+const NARROW = 560;  // where the buttons are above the figure (page.css)
+const legendWidth = (width) => Math.max(120, width - (isPrinting() || width < NARROW ? 8 : BUTTONS_WIDTH));
+
+/** Returns the height that a printed legend needs beyond its first line. */
+function legendHeight(option, width) {
+  if (!option.legend || !isPrinting()) return 0;
+  const names = [...new Set(option.series.map(({name}) => name).filter(Boolean))];
+  let lines = 1;
+  let at = 0;
+  for (const name of names) {
+    const wide = 34 + 6.6 * Math.min(42, name.length);
+    if (at > 0 && at + wide > legendWidth(width)) {
+      lines += 1;
+      at = 0;
+    }
+    at += wide;
+  }
+  return 19 * (lines - 1);
 }
 
 // Adds the page's text, axes and tooltips to an option. The figure's own values take precedence.
@@ -47,14 +112,13 @@ function withTheme(option, t, width) {
     animation: false,
     // ECharts writes the names into a saved SVG between double quotes, without escaping.
     textStyle: {fontFamily: "system-ui, -apple-system, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif"},
-    color: t.palette,
     ...option,
     xAxis: axes(option.xAxis),
     yAxis: axes(option.yAxis),
     legend: option.legend && {
-      // The legend ends before the buttons, which are not printed. ECharts uses only one of left and right beside the
-      // width.
-      type: 'scroll', top: 0, left: 0, width: Math.max(120, width - (beforePrint === null ? 92 : 8)), icon: 'roundRect', itemWidth: 14, itemHeight: 10,
+      // The legend ends before the buttons. Paper has no buttons, and no pages of a legend. ECharts uses only one of left
+      // and right beside the width.
+      type: isPrinting() ? 'plain' : 'scroll', top: 0, left: 0, width: legendWidth(width), icon: 'roundRect', itemWidth: 14, itemHeight: 10,
       formatter: (name) => (name.length > 42 ? `${name.slice(0, 41)}\u2026` : name), textStyle: {color: t.ink},
       pageTextStyle: {color: t.soft}, pageIconColor: t.ink, inactiveColor: t.line, ...option.legend,
     },
@@ -95,16 +159,26 @@ function pictureOf(option, kind, width, height) {
 
 /**
  * Returns a figure. `build(t, width)` returns an ECharts option for theme `t`, or a sentence if there is nothing to
- * draw. `canvas` draws pixels instead of SVG, for many shapes. `onready(chart)` is called with every new chart.
+ * draw. `data()` returns what it shows as {columns, rows} of a table. `canvas` draws pixels instead of SVG, for many
+ * shapes. `onready(chart)` is called with every new chart. A figure with a dataZoom gets buttons for it.
  */
-function figure({name, height, build, caption, canvas = false, label, onready}) {
+function figure({name, height, build, data, caption, canvas = false, label, onready, zooms = false}) {
   const place = element('div', {style: `height:${height}px`, role: 'img', 'aria-label': label});
-  const box = element('figure', {'data-figure': name}, element('div.chart', {}, place),
-    element('figcaption', {}, caption));
+  const values = element('details.data', {ontoggle: () => fillData()}, element('summary', {}, 'Data of this figure'), element('div'));
+  const box = element('figure', {'data-figure': name}, element('div.chart', {}, place), element('figcaption', {}, caption), data ? values : null);
+  // The wheel belongs to the page. ECharts would take it for every figure that can zoom, even where it does nothing.
+  for (const wheel of ['wheel', 'mousewheel']) {
+    place.addEventListener(wheel, (event) => { if (!event.ctrlKey) event.stopPropagation(); }, {capture: true, passive: true});
+  }
   let chart = null;
   let drawn = null;  // the option drawn
   let nothing = null;
 
+  function fillData() {
+    if (!data || !values.open) return;
+    const {columns, rows} = data();
+    values.lastElementChild.replaceChildren(table(`${label}: data`, columns, rows));
+  }
   function save(kind) {
     const now = chart.getOption();  // includes the reader's zoom and legend selection
     const option = {...drawn, backgroundColor: theme().paper};
@@ -112,9 +186,11 @@ function figure({name, height, build, caption, canvas = false, label, onready}) 
     if (drawn.legend) option.legend = {...drawn.legend, selected: now.legend[0].selected};
     download(`redag-${name}.${kind}`, pictureOf(option, kind, place.clientWidth, height));
   }
-  box.prepend(element('span.save.controls', {}, ...['png', 'svg'].map((kind) => element('button', {
-    type: 'button', title: `Save this figure as ${kind.toUpperCase()}`, 'aria-label': `${name} as ${kind}`, onclick: () => save(kind),
-  }, kind.toUpperCase()))));
+  const tool = (text, what, act) => element('button', {type: 'button', title: what, 'aria-label': `${name}: ${what}`, onclick: () => { if (chart) act(); }}, text);
+  box.prepend(element('span.tools.controls', {role: 'group', 'aria-label': `${label}: tools`},
+    ...(zooms ? [tool('\u2190', 'earlier', () => self.zoom(1, -0.5)), tool('\u2192', 'later', () => self.zoom(1, 0.5)),
+      tool('+', 'zoom in', () => self.zoom(2, 0)), tool('\u2212', 'zoom out', () => self.zoom(0.5, 0))] : []),
+    ...['png', 'svg'].map((kind) => tool(kind.toUpperCase(), `save as ${kind.toUpperCase()}`, () => save(kind)))));
 
   const self = {
     box,
@@ -123,7 +199,15 @@ function figure({name, height, build, caption, canvas = false, label, onready}) 
       height = pixels;
       place.style.height = `${pixels}px`;
     },
+    /** Shows 1/factor of what is shown now, moved by a share of it. */
+    zoom(factor, shift) {
+      const {start, end} = chart.getOption().dataZoom[0];
+      const length = Math.min(100, (end - start) / factor);
+      const begin = Math.max(0, Math.min(100 - length, (start + end - length) / 2 + shift * length));
+      chart.dispatchAction({type: 'dataZoom', start: begin, end: begin + length});
+    },
     draw() {
+      fillData();
       const width = place.clientWidth;
       if (width === 0) return;
       const t = theme();
@@ -139,6 +223,9 @@ function figure({name, height, build, caption, canvas = false, label, onready}) 
         place.style.display = 'none';
         return;
       }
+      const extra = legendHeight(option, width);
+      place.style.height = `${height + extra}px`;
+      if (extra > 0) option.grid = [].concat(option.grid).map((grid) => ({...grid, top: grid.top + extra}));
       chart = echarts.init(place, null, {renderer: canvas ? 'canvas' : 'svg', devicePixelRatio: Math.max(2, window.devicePixelRatio)});
       drawn = withTheme(option, t, width);
       chart.setOption(drawn);
@@ -162,10 +249,12 @@ window.addEventListener('beforeprint', () => {
   forced = 'light';
   document.getElementById('report').style.width = '700px';
   applyTheme();
+  refillTables();
 });
 window.addEventListener('afterprint', () => {
   ({forced} = beforePrint);
   beforePrint = null;
   document.getElementById('report').style.width = '';
   applyTheme();
+  refillTables();
 });

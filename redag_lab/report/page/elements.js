@@ -24,31 +24,13 @@ function svgElement(tag, attributes, ...children) {
   return node;
 }
 
-/**
- * Returns a table in a frame that scrolls sideways. A row is an array of strings, nodes, or {text, kind}; its first
- * cell is the row's head.
- */
-function table(columns, rows) {
-  const cell = (content, tag, column) => {
-    const plain = content === null || typeof content !== 'object' || content instanceof Node;
-    const {text, kind = '', title} = plain ? {text: content} : content;
-    const classes = [tag, kind, columns[column].text ? 'text' : ''].filter((part) => part !== '').join('.');
-    return element(classes, {title, scope: tag === 'th' ? 'row' : null}, text);
-  };
-  const head = element('tr', {}, ...columns.map((column) => element(column.text ? 'th.text' : 'th',
-    {scope: 'col', title: column.help}, column.title)));
-  const body = rows.map((row) => element(row.first ? 'tr.group' : 'tr', {},
-    ...row.cells.map((content, i) => cell(content, i === 0 ? 'th' : 'td', i))));
-  return element('div.table', {tabindex: '0'}, element('table', {}, element('thead', {}, head), element('tbody', {}, ...body)));
-}
-
-/** Returns a row of buttons, one of which is pressed. A press on another one calls `choose(index)`. */
-function choice(names, chosen, choose) {
+/** Returns a named row of buttons, one of which is pressed. A press on another one calls `choose(index)`. */
+function choice(label, names, chosen, choose) {
   const buttons = names.map((name, i) => element('button', {type: 'button', 'aria-pressed': String(i === chosen), onclick: () => {
     buttons.forEach((button, j) => button.setAttribute('aria-pressed', String(i === j)));
     choose(i);
   }}, name));
-  return element('span.switch', {role: 'group'}, ...buttons);
+  return element('span.switch', {role: 'group', 'aria-label': label}, ...buttons);
 }
 
 /** Returns a labelled drop-down list. */
@@ -57,6 +39,12 @@ function dropdown(label, names, chosen, choose) {
     ...names.map((name, i) => element('option', i === chosen ? {selected: ''} : {}, name)));
   return element('label', {}, label, list);
 }
+
+/** Returns a name that may break between its parts. */
+const breakable = (name) => name.split(/(?<=[._/])/).flatMap((part, i) => (i === 0 ? [part] : [element('wbr'), part]));
+
+/** Returns a heading that the contents list, if it has an `id`. */
+const heading = (level, id, text) => element(`h${level}`, {id, tabindex: '-1'}, text);
 
 /** Returns a tooltip's lines, the first one bold. As a node, they cannot be parsed as markup by ECharts. */
 function tip(lines) {

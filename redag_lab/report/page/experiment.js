@@ -23,10 +23,19 @@ const varied = factors.filter(({name, levels}) => name !== EXECUTOR && levels.le
 const pairs = (factors.find(({name}) => name === 'max_active') || {levels: []}).levels.filter((level) => /^\d+\+\d+$/.test(level));
 
 const METRICS = {
-  miss_ratio: 'missed: late, skipped or aborted', drop_ratio: 'skipped', excess_miss_ratio: 'missed above the ideal', response_p50_ns: 'median end to end',
-  response_p95_ns: 'p95 end to end', response_p99_ns: 'p99 end to end', response_max_ns: 'longest end to end, of all runs', max_lateness_ns: 'largest lateness, of all runs',
-  deferred: 'deferred, of all jobs', preemptions: 'preemptions per job', paper_miss_ratio: 'missed, counted as in the paper',
-  finished_per_s: 'finished jobs per second', work: 'processors in use',
+  miss_ratio: 'missed: late, skipped or aborted',
+  drop_ratio: 'skipped',
+  excess_miss_ratio: 'missed above the ideal',
+  response_p50_ns: 'median end to end',
+  response_p95_ns: 'p95 end to end',
+  response_p99_ns: 'p99 end to end',
+  response_max_ns: 'longest end to end, of all runs',
+  max_lateness_ns: 'largest lateness, of all runs',
+  deferred: 'deferred, of all jobs',
+  preemptions: 'preemptions per job',
+  paper_miss_ratio: 'missed, counted as in the paper',
+  finished_per_s: 'finished jobs per second',
+  work: 'processors in use',
 };
 // Returns the reason why a figure is empty.
 const nothing = (metric) => (metric.startsWith('response_') ? 'A response time belongs to one DAG, end to end: choose a DAG. (A DAG that never finished has none.)'
@@ -66,10 +75,24 @@ function spreadAt(executor, metric, other = {}) {
 
 const where = (skip) => varied.filter(({name}) => !skip.includes(name)).map(({name}) => `${words(name)} ${state.levels[name]}`).join(', ');
 
+/** Returns a figure's data: rows of [first, executor, spread]. */
+function spreadTable(first, metric, rows) {
+  const number = (value) => ({text: show(metric, value), sort: value});
+  return {
+    columns: [column(first), column('executor', '', true), column(METRICS[metric]), column('least'), column('most')],
+    rows: rows.filter(([, , spread]) => spread).map(([at, name, spread]) => ({cells: [{text: at, sort: Number.isNaN(Number(at)) ? at : Number(at)}, name, ...spread.map(number)]})),
+  };
+}
+
 /** Draws a metric over the chosen factor, with a line for each executor. */
 function curvesFigure(name, metricOf, caption) {
   return figure({
-    name, height: 348, label: 'A metric over a factor, by executor', caption,
+    name, height: 348, label: `${name === 'distance' ? 'Distance to the ideal' : 'A metric'} over a factor, by executor`, caption,
+    data() {
+      const factor = varied[state.x];
+      const metric = metricOf();
+      return spreadTable(words(factor.name), metric, factor.levels.flatMap((level) => executors.map((executor) => [level, label(executor), spreadAt(executor, metric, {[factor.name]: level})])));
+    },
     build(t, width) {
       const factor = varied[state.x];
       const metric = metricOf();
@@ -103,9 +126,9 @@ function curvesFigure(name, metricOf, caption) {
         },
         series: [
           ...lines.map(({executor, e, values}) => ({
-            type: 'line', name: label(executor), symbol: symbols[e % symbols.length], symbolSize: 8, itemStyle: {color: colourOf(t, e)},
+            type: 'line', name: label(executor), symbol: symbols[e % symbols.length], symbolSize: 8, itemStyle: {color: hueOf(t, e).color},
             // Between levels that are not numbers the line has no values and only guides the eye.
-            lineStyle: {width: 2, opacity: factor.numeric ? 1 : 0.35, type: executor === 'ideal' || executor === 'unlimited' ? 'dashed' : 'solid'}, data: values,
+            lineStyle: {width: 2, opacity: factor.numeric ? 1 : 0.35, type: executor === 'ideal' || executor === 'unlimited' ? 'dashed' : hueOf(t, e).dash}, data: values,
           })),
           ...lines.map(({executor, e, values}) => ({
             type: 'custom', name: label(executor), silent: true, data: values, encode: {x: 0, y: [2, 3]},
@@ -113,7 +136,7 @@ function curvesFigure(name, metricOf, caption) {
               const [left, top] = api.coord([api.value(0), api.value(3)]);
               const bottom = api.coord([api.value(0), api.value(2)])[1];
               if (bottom - top < 1) return null;
-              const bar = (x1, y1, x2, y2) => ({type: 'line', shape: {x1, y1, x2, y2}, style: {stroke: colourOf(t, e), lineWidth: 1}});
+              const bar = (x1, y1, x2, y2) => ({type: 'line', shape: {x1, y1, x2, y2}, style: {stroke: hueOf(t, e).color, lineWidth: 1}});
               return {type: 'group', children: [bar(left, top, left, bottom), bar(left - 4, top, left + 4, top), bar(left - 4, bottom, left + 4, bottom)]};
             },
           })),
@@ -127,6 +150,7 @@ function curvesFigure(name, metricOf, caption) {
 function worldsFigure() {
   return figure({
     name: 'worlds', height: 340, label: 'A metric of each executor, in each world',
+    data: () => spreadTable('world', state.metric, executors.map((executor) => [WORLDS[worldOf.get(executor)], plainName(executor), spreadAt(executor, state.metric)])),
     caption: `Medians at the chosen levels, of ${worlds.length > 1 ? 'the same executor in each world that it ran in' : 'each executor'}. ${intervals}`,
     build(t, width) {
       const {metric} = state;
@@ -160,7 +184,7 @@ function worldsFigure() {
         },
         series: [
           ...worlds.map((world, w) => ({
-            type: 'bar', name: WORLDS[world], ...bars, itemStyle: {color: colourOf(t, w), borderRadius: [3, 3, 0, 0]},
+            type: 'bar', name: WORLDS[world], ...bars, itemStyle: {...fillOf(t, shadeOf(t, w)), borderRadius: [3, 3, 0, 0]},
             data: names.map((name) => { const one = spread(name, world); return one === null ? null : one[0]; }),
             label: {show: names.length * worlds.length * 78 <= width, position: 'top', color: t.soft, fontSize: 11, distance: 6,
               formatter: ({value}) => show(metric, value)},
@@ -190,6 +214,7 @@ function boundsFigure() {
   const note = element('p.soft');
   const self = figure({
     name: 'bounds', height: 380, label: 'A metric for each pair of bounds',
+    data: () => spreadTable('max_active', state.metric, pairs.map((pair) => [pair.replace('+', ' and '), label(owners[state.owner]), spreadAt(owners[state.owner], state.metric, {max_active: pair})])),
     caption: 'Horizontal: max_active of the first DAG; vertical: of the second. Numbers are medians; maxima are the largest of all runs.',
     build(t, width) {
       const owner = owners[state.owner];
@@ -203,7 +228,7 @@ function boundsFigure() {
       const most = Math.max(...values);
       const part = (value) => (most > least ? (value - least) / (most - least) : 0);
       const mix = (from, to, share) => `rgb(${from.map((c, i) => Math.round(c + (to[i] - c) * share)).join(',')})`;
-      const shade = (value) => (t.dark ? mix([24, 44, 66], [214, 120, 48], part(value)) : mix([226, 238, 251], [196, 88, 8], part(value)));
+      const shade = (value) => (t.dark ? mix([30, 40, 50], [150, 172, 192], part(value)) : mix([232, 238, 243], [52, 78, 102], part(value)));
       note.textContent = `${label(owner)}: ${METRICS[state.metric]}${free ? `; without bounds ${show(state.metric, free[0])}` : ''}`;
       return {
         grid: {left: 60, right: 16, top: 28, bottom: 52},
@@ -222,7 +247,7 @@ function boundsFigure() {
             return {type: 'group', children: [
               {type: 'rect', shape: {x: x - w / 2 + 1, y: y - h / 2 + 1, width: w - 2, height: h - 2}, style: {fill: shade(value)}},
               {type: 'text', style: {text: show(state.metric, value), x, y, textAlign: 'center', textVerticalAlign: 'middle', fontSize: width < 500 ? 10 : 13,
-                fill: t.dark || part(value) > 0.6 ? '#fff' : '#1b1f24'}},
+                fill: (part(value) > 0.5) === t.dark ? '#11151a' : '#ffffff'}},
             ]};
           },
         }],
@@ -239,13 +264,18 @@ function effectsFigure() {
   const terms = [...new Set(shown.flatMap(({shares}) => shares.map(name)))];
   return figure({
     name: 'effects', height: 140 + 34 * Math.max(1, shown.length), label: 'Shares of the variation that each factor explains',
+    data: () => ({
+      columns: [column('executor'), column('workload', '', true), column('explained by', '', true), column('share')],
+      rows: shown.flatMap((one) => [...one.shares.map((share) => [name(share), share.share]), ['three or more', one.higher_interactions], ['chance', one.noise]]
+        .map(([term, share]) => ({cells: [label(one.executor), one.workload, term, {text: formatPercent(share), sort: share}]}))),
+    }),
     caption: 'Shares of the variation of the miss ratio over all runs of an executor: explained by one factor alone, by pairs of factors '
       + 'together (\u00d7), by three or more factors, and by chance.',
     build(t) {
       if (shown.length === 0) return report.complete ? 'The miss ratio is the same everywhere.' : 'The effects are available once all runs are done.';
       const rows = shown.map(({workload, executor}) => (new Set(shown.map((one) => one.workload)).size > 1 ? `${label(executor)}, ${workload}` : label(executor)));
       const value = (one, term) => (one.shares.find((share) => name(share) === term) || {share: 0}).share;
-      const stack = (label, data, i) => ({type: 'bar', stack: 'all', name: label, data, itemStyle: {color: colourOf(t, i), opacity: i >= 8 ? 0.55 : 1}, barMaxWidth: 22});
+      const stack = (label, data, i) => ({type: 'bar', stack: 'all', name: label, data, itemStyle: fillOf(t, shadeOf(t, i)), barMaxWidth: 22});
       return {
         grid: {left: 8, right: 16, top: 82, bottom: 8, containLabel: true},
         legend: {type: 'plain', right: 90},
@@ -260,6 +290,27 @@ function effectsFigure() {
       };
     },
   });
+}
+
+/** Returns the mean share of missed jobs of each executor but the ideal one, over all combinations; the best first. */
+function meanMisses() {
+  return executors.filter((executor) => plainName(executor) !== 'ideal').map((executor) => {
+    const shares = points.filter(({at, dags}) => at.executor === executor && dags.length > 0).map(({dags}) => dags[dags.length - 1])
+      .map((all) => all.missed / Math.max(1, all.released));
+    return {name: label(executor), mean: shares.reduce((a, b) => a + b, 0) / shares.length, any: shares.length > 0};
+  }).filter(({any}) => any).sort((a, b) => a.mean - b.mean);
+}
+
+function headlineOf() {
+  if (report.violations > 0) return {tone: 'bad', text: `The trace checker found ${formatCount(report.violations)} violations of the model`};
+  const means = meanMisses();
+  if (means.length === 0) return {tone: 'caution', text: 'No run is done'};
+  const [best] = means;
+  const worst = means[means.length - 1];
+  const of = ({name, mean}) => `${name} ${formatPercent(mean)}`;
+  if (worst.mean === 0) return {tone: 'good', text: 'No deadline was missed'};
+  if (means.length === 1) return {tone: 'plain', text: `Missed deadlines, on average: ${of(best)}`};
+  return {tone: 'plain', text: `Missed deadlines, on average: from ${of(best)} to ${of(worst)}`};
 }
 
 function verdict() {
@@ -284,35 +335,36 @@ function verdict() {
     }).filter((part) => part !== null);
     say('plain', `${workload}: missed${varied.length > 1 ? ', mean over all combinations' : ''}: ${parts.join('; ')}.`);
   });
-  return verdictList(list);
+  return list;
 }
 
 function selectionTable() {
   const factor = varied[state.x];
   const levels = factor === undefined ? [''] : factor.levels;
   const shownMetrics = ['miss_ratio', 'drop_ratio', 'excess_miss_ratio', 'paper_miss_ratio', 'response_p50_ns', 'response_p99_ns', 'max_lateness_ns'];
-  const columns = [{title: factor ? words(factor.name) : ''}, {title: 'executor', text: true}, ...(worlds.length > 1 ? [{title: 'world', text: true}] : []),
-    ...shownMetrics.map((metric) => ({title: METRICS[metric]}))];
+  const inWorlds = worlds.length > 1 ? [column('world', '', true)] : [];
+  const columns = [...(factor ? [column(words(factor.name)), column('executor', '', true)] : [column('executor')]), ...inWorlds, ...shownMetrics.map((metric) => column(METRICS[metric]))];
   const rows = [];
   levels.forEach((level) => {
     let first = true;
     executors.forEach((executor) => {
       const spread = (metric) => spreadAt(executor, metric, factor ? {[factor.name]: level} : {});
       if (spread('miss_ratio') === null) return;
-      rows.push({first, cells: [first ? level : '', plainName(executor), ...(worlds.length > 1 ? [WORLDS[worldOf.get(executor)]] : []), ...shownMetrics.map((metric) => {
+      const at = factor ? [{text: level, sort: Number.isNaN(Number(level)) ? level : Number(level), kind: first ? '' : 'again'}] : [];
+      rows.push({first, cells: [...at, plainName(executor), ...(worlds.length > 1 ? [WORLDS[worldOf.get(executor)]] : []), ...shownMetrics.map((metric) => {
         const value = spread(metric);
-        if (value === null) return '';
+        if (value === null) return {text: '\u2013', sort: null};
         const range = `${show(metric, value[1])} to ${show(metric, value[2])}`;
-        if (metric !== 'miss_ratio') return {text: show(metric, value[0]), title: range};
+        if (metric !== 'miss_ratio') return {text: show(metric, value[0]), sort: value[0], title: range};
         // If most runs missed nothing, the median hides the misses of the others.
         const {missed, released} = dagAt(executor, factor ? {[factor.name]: level} : {});
         const counted = `${formatCount(missed)} of ${formatCount(released)}`;
-        return {text: value[0] === 0 && missed > 0 ? counted : show(metric, value[0]), title: `${range}; ${counted} in all runs`, kind: missed > 0 ? 'bad' : ''};
+        return {text: value[0] === 0 && missed > 0 ? counted : show(metric, value[0]), sort: value[0], title: `${range}; ${counted} in all runs`, kind: missed > 0 ? 'missed' : ''};
       })]});
       first = false;
     });
   });
-  return table(columns, rows);
+  return table('Metrics', columns, rows);
 }
 
 function howItWasRun() {
@@ -321,12 +373,12 @@ function howItWasRun() {
   const worldRows = worlds.length > 1 ? byWorld(executors).map(({world, names}) => [WORLDS[world], `${names.map(plainName).join(', ')} ${DRIVERS[world]}`])
     : [['World', DRIVERS[worlds[0]]]];
   return [
-    element('h2', {id: 'how'}, 'How the runs were made'),
+    heading(2, 'how', 'How the runs were made'),
     element('dl', {}, ...[...worldRows, ['Length of a run', formatTime(report.duration_ns)],
       ['Runs per combination', String(report.repetitions)], ['Combinations', formatCount(points.length)], ['Machine', machines.join('; ') || 'not recorded'],
       ...provenanceRows(report.results_provenance),
     ].flatMap(([name, value]) => [element('dt', {}, name), element('dd', {}, value)])),
-    element('details', {}, element('summary', {}, 'The plan'), element('pre', {}, report.plan)),
+    element('details', {}, element('summary', {}, 'The plan'), element('pre', {tabindex: '0'}, report.plan)),
     pageFooter(report),
   ];
 }
@@ -357,17 +409,18 @@ const controls = filled(() => element('div.row.controls', {},
 startPage([
   element('div.head', {}, element('h1', {}, report.name), element('div.controls', {}, themeChoice())),
   element('p.facts', {}, [plainNames.join(', '), worlds.map((world) => DRIVERS[world]).join(', '), `${formatCount(report.done)} runs of ${formatTime(report.duration_ns)}`].join(' \u00b7 ')),
-  verdict(),
-  element('h2', {id: 'curves'}, varied.length > 0 ? 'Over one factor' : 'Executors side by side'), controls,
+  headline(headlineOf()), verdictList(verdict()),
+  element('details', {}, element('summary', {}, 'Colours and lines'), filled(() => colourKey('executor', 'world, or factor'))),
+  heading(2, 'curves', varied.length > 0 ? 'Over one factor' : 'Executors side by side'), controls,
   ...(varied.length > 0 ? [filled(() => element('p.soft', {}, where([varied[state.x].name]))), curves.box,
-    element('h3', {}, 'Distance to the ideal'), distance.box, filled(selectionTable)] : []),
-  ...(bars === null ? [] : [worlds.length > 1 ? element('h2', {id: 'worlds'}, 'Comparison of worlds') : null,
+    heading(3, 'distance', 'Distance to the ideal'), distance.box, filled(selectionTable)] : []),
+  ...(bars === null ? [] : [worlds.length > 1 ? heading(2, 'worlds', 'Comparison of worlds') : null,
     varied.length > 0 ? filled(() => element('div.row.controls', {}, levelChoice(varied[state.x]))) : null,
     varied.length > 0 ? filled(() => element('p.soft', {}, where([]))) : null, bars.box]),
   ...(varied.length > 0 ? [] : [filled(selectionTable)]),
-  ...(pairs.length > 0 ? [element('h2', {id: 'bounds'}, 'Bounds on two DAGs'),
-    map.owners.length > 1 ? element('div.row.controls', {}, choice(map.owners.map(label), 0, (i) => { state.owner = i; map.figure.draw(); })) : null,
+  ...(pairs.length > 0 ? [heading(2, 'bounds', 'Bounds on two DAGs'),
+    map.owners.length > 1 ? element('div.row.controls', {}, choice('Executor', map.owners.map(label), 0, (i) => { state.owner = i; map.figure.draw(); })) : null,
     filled(() => element('p.soft', {}, where(['max_active']))), map.note, map.figure.box] : []),
-  ...(effects !== null ? [element('h2', {id: 'effects'}, 'What explains the differences'), effects.box] : []),
+  ...(effects !== null ? [heading(2, 'effects', 'What explains the differences'), effects.box] : []),
   ...howItWasRun(),
 ]);

@@ -10,13 +10,14 @@ const MOST_LINES = 24;        // that a figure can show legibly
 const taskName = (group, task) => `${group.dags[group.tasks[task].dag].name}.${group.tasks[task].name}`;
 const hasCurve = (task) => task.responses !== undefined && task.responses.value_ns.length > 0;
 
+const awaitedOf = ({jobs}) => jobs.missed + jobs.finished - jobs.late;  // finished, lost or overdue
+
 /**
  * Returns the share of jobs that had finished by each time. Lost jobs never finish, and jobs in progress at the end are
  * left out.
  */
 function distribution(task, scale, tail) {
-  const jobs = task.jobs;
-  const awaited = jobs.missed + jobs.finished - jobs.late;  // finished, lost or overdue
+  const awaited = awaitedOf(task);
   const points = task.responses.value_ns.map((ns, i) => {
     const share = task.responses.count[i] / Math.max(1, awaited);
     return [ns / scale, tail ? 1 - share : share];
@@ -26,11 +27,22 @@ function distribution(task, scale, tail) {
   return [first, ...points].filter(([, share]) => !tail || share > 1e-12);
 }
 
-function verticalLine(t, x, text, colour, position) {
+const LIMITS = {deadline: 'dashed', bound: 'dotted'};
+
+/** Returns a vertical line at a deadline or a bound. */
+function limitLine(t, x, kind, position = 'end') {
   return {
-    xAxis: x, lineStyle: {color: colour, type: 'dashed', width: 1.5}, symbol: 'none',
-    label: {formatter: () => text, color: colour, position: position || 'end', distance: 4},
+    xAxis: x, lineStyle: {color: t.ink, type: LIMITS[kind], width: 1.6}, symbol: 'none',
+    label: {formatter: () => kind, color: t.ink, position, distance: 4},
   };
+}
+
+/** Returns the smallest response that at least this share of the awaited jobs kept to; null if too many were lost. */
+function quantile(task, share) {
+  const {value_ns: values, count} = task.responses;
+  const wanted = share * awaitedOf(task);
+  const at = count.findIndex((jobs) => jobs >= wanted);
+  return at < 0 ? null : values[at];
 }
 
 /**
@@ -38,32 +50,34 @@ function verticalLine(t, x, text, colour, position) {
  * each as a share of its deadline.
  */
 function responseFigure(groups, state) {
+  const nameOfChosen = () => (state.task === null ? null : taskName(groups[state.executor], state.task));
+  function lines() {
+    const name = nameOfChosen();
+    const all = groups.flatMap((group, g) => (name === null && g !== state.executor ? [] : group.tasks.map((task, i) => ({group, g, task, i}))))
+      .filter(({group, task, i}) => hasCurve(task) && (name === null || taskName(group, i) === name));
+    if (all.length <= MOST_LINES) return all;
+    const closeness = ({task}) => task.jobs.response.max_ns / task.deadline_ns;
+    return all.sort((a, b) => closeness(b) - closeness(a)).slice(0, MOST_LINES);
+  }
+  const lineName = ({group, i}) => (state.task === null ? taskName(group, i) : group.label);
   return figure({
-    name: 'responses', height: 368, label: 'Distribution of response times',
+    name: 'responses', height: 368, label: 'Distribution of response times', zooms: true,
     caption: 'Response time: finish \u2212 nominal release. Lost jobs never finish: a task with lost jobs has a '
       + `curve that ends below 1. At most ${MOST_LINES} tasks are shown, the closest to their deadlines. Click the legend to hide or show a line.`,
+    data: () => ({
+      columns: [column(state.task === null ? 'task' : 'executor'), column('deadline'), ...[50, 90, 95, 99].map((p) => column(`p${p}`)), column('max'), column('finished')],
+      rows: lines().map((line) => ({cells: [lineName(line), timeCell(line.task.deadline_ns), ...[0.5, 0.9, 0.95, 0.99].map((share) => timeCell(quantile(line.task, share))),
+        timeCell(line.task.jobs.response.max_ns), shareCell(line.task.jobs.finished, line.task.jobs.released)]})),
+    }),
     build(t, width) {
       const one = state.task !== null;
-      const name = one ? taskName(groups[state.executor], state.task) : null;
-      const lines = [];
-      groups.forEach((group, g) => {
-        if (!one && g !== state.executor) return;
-        group.tasks.forEach((task, i) => {
-          if (!hasCurve(task) || (one && taskName(group, i) !== name)) return;
-          lines.push({group, g, task, i});
-        });
-      });
-      if (lines.length > MOST_LINES) {
-        const closeness = ({task}) => task.jobs.response.max_ns / task.deadline_ns;
-        lines.sort((a, b) => closeness(b) - closeness(a)).splice(MOST_LINES);
-      }
-      if (lines.length === 0) return 'No job of this task finished.';
+      const drawn = lines();
+      if (drawn.length === 0) return 'No job of this task finished.';
       const mark = one ? groups[state.executor].tasks[state.task] : null;
       const marks = one
-        ? [verticalLine(t, mark.deadline_ns, 'deadline', t.bad),
-          ...(mark.bound_ns === null ? [] : [verticalLine(t, mark.bound_ns, 'bound', t.good, 'insideEndTop')])]
-        : [verticalLine(t, 1, 'deadline', t.bad)];
-      const most = Math.max(...lines.map(({task}) => task.responses.value_ns[task.responses.value_ns.length - 1]
+        ? [limitLine(t, mark.deadline_ns, 'deadline'), ...(mark.bound_ns === null ? [] : [limitLine(t, mark.bound_ns, 'bound', 'insideEndTop')])]
+        : [limitLine(t, 1, 'deadline')];
+      const most = Math.max(...drawn.map(({task}) => task.responses.value_ns[task.responses.value_ns.length - 1]
         / (one ? 1 : task.deadline_ns)));
       const edge = one ? Math.max(mark.deadline_ns, mark.bound_ns || 0) : 1;
       return {
@@ -85,39 +99,58 @@ function responseFigure(groups, state) {
           ? {type: 'log', max: 1, name: 'share of jobs that take longer', nameGap: 24, nameTextStyle: {align: 'left'},
             axisLabel: {formatter: (value) => String(value)}}
           : {type: 'value', min: 0, max: 1, name: 'share of jobs', nameGap: 24, nameTextStyle: {align: 'left'}},
-        series: lines.map(({group, g, task, i}, k) => ({
-          type: 'line', name: one ? group.label : taskName(group, i), step: 'end', showSymbol: false, symbolSize: 8,
-          triggerLineEvent: true, data: distribution(task, one ? 1 : task.deadline_ns, state.tail),
-          lineStyle: {width: 2, type: one ? 'solid' : ['solid', 'dashed', 'dotted'][Math.floor(i / 8) % 3]},
-          itemStyle: {color: colourOf(t, one ? g : i)},
-          markLine: k === 0 ? {symbol: 'none', silent: true, data: marks, animation: false} : undefined,
-        })),
+        series: drawn.map((line, k) => {
+          const look = one ? shadeOf(t, line.g) : {color: hueOf(t, line.task.dag).color, dash: DASHES[placeInDag(line) % DASHES.length]};
+          return {
+            type: 'line', name: lineName(line), step: 'end', showSymbol: false, symbolSize: 8,
+            triggerLineEvent: true, data: distribution(line.task, one ? 1 : line.task.deadline_ns, state.tail),
+            lineStyle: {width: 2, type: look.dash}, itemStyle: {color: look.color},
+            markLine: k === 0 ? {symbol: 'none', silent: true, data: marks, animation: false} : undefined,
+          };
+        }),
       };
     },
   });
 }
 
+/** Returns how many tasks of its DAG come before the task of a line. */
+const placeInDag = ({group, i}) => i - group.tasks.findIndex((task) => task.dag === group.tasks[i].dag);
+
 /** Draws how early or late jobs finished, in classes of 1/40 of the deadline. */
 function latenessFigure(groups, state) {
+  const half = LATENESS_CLASSES / 2;
+  const latenessClass = (i) => (i === LATENESS_CLASSES ? 'more than one deadline late'
+    : `${((i - half) / half).toFixed(3)} to ${((i + 1 - half) / half).toFixed(3)} of the deadline`);
+  function latenessByDag() {
+    const group = groups[state.executor];
+    const byDag = group.dags.map(() => new Array(LATENESS_CLASSES + 1).fill(0));
+    const tasks = state.task !== null ? [group.tasks[state.task]] : group.tasks;
+    tasks.forEach((task) => (task.lateness || []).forEach((count, i) => { byDag[task.dag][i] += count; }));
+    return byDag;
+  }
   return figure({
     name: 'lateness', height: 308, label: 'Histogram of lateness',
+    data() {
+      const group = groups[state.executor];
+      const counts = latenessByDag();
+      const classes = Array.from({length: LATENESS_CLASSES + 1}, (_, i) => i).filter((i) => counts.some((dag) => dag[i] > 0));
+      return {
+        columns: [column('lateness / deadline'), ...group.dags.map((dag) => column(dag.name))],
+        rows: classes.map((i) => ({cells: [{text: latenessClass(i), sort: i}, ...counts.map((dag) => countCell(dag[i]))]})),
+      };
+    },
     caption: 'Lateness: finish \u2212 deadline, relative to the deadline. \u22121 is the release; jobs right of 0 are late. The last '
       + 'class holds all jobs that are later than one whole deadline. Lost jobs have no lateness. Logarithmic.',
     build(t, width) {
       const group = groups[state.executor];
-      const tasks = state.task !== null ? [group.tasks[state.task]] : group.tasks;
-      const byDag = group.dags.map(() => new Array(LATENESS_CLASSES + 1).fill(0));
-      tasks.forEach((task) => (task.lateness || []).forEach((count, i) => { byDag[task.dag][i] += count; }));
+      const byDag = latenessByDag();
       const most = Math.max(...byDag.map((counts) => Math.max(...counts)));
       if (most === 0) return 'No job finished.';
-      const half = LATENESS_CLASSES / 2;
-      const bounds = (i) => (i === LATENESS_CLASSES ? 'more than one deadline late'
-        : `${((i - half) / half).toFixed(3)} to ${((i + 1 - half) / half).toFixed(3)} of the deadline`);
       const used = group.dags.map((dag, d) => ({dag, d})).filter(({d}) => Math.max(...byDag[d]) > 0);
       return {
         grid: {left: 8, right: 24, top: 66, bottom: 32, containLabel: true},
         legend: {},
-        tooltip: {trigger: 'item', formatter: (item) => tip([item.seriesName, bounds(item.dataIndex), `${formatCount(item.value)} jobs`])},
+        tooltip: {trigger: 'item', formatter: (item) => tip([item.seriesName, latenessClass(item.dataIndex), `${formatCount(item.value)} jobs`])},
         xAxis: {
           type: 'category', name: 'lateness / deadline', nameLocation: 'middle', nameGap: 30,
           data: Array.from({length: LATENESS_CLASSES + 1}, (_, i) => (i === LATENESS_CLASSES ? '> 1' : String((i - half) / half))),
@@ -128,11 +161,9 @@ function latenessFigure(groups, state) {
           axisLabel: {formatter: (value) => (value < 1 ? '' : formatCount(value))}},
         series: used.map(({dag, d}, k) => ({
           type: 'bar', name: dag.name, barGap: '-100%', barCategoryGap: '8%', barMinHeight: 1,
-          itemStyle: {color: colourOf(t, d), opacity: used.length > 1 ? 0.72 : 1},
+          itemStyle: {color: hueOf(t, d).color, opacity: used.length > 1 ? 0.72 : 1},
           data: byDag[d].map((count) => (count === 0 ? null : count)),
-          markLine: k === 0 ? {symbol: 'none', silent: true, animation: false, data: [{
-            xAxis: half, lineStyle: {color: t.bad, type: 'dashed', width: 1.5},
-            label: {formatter: () => 'deadline', color: t.bad, position: 'end'}}]} : undefined,
+          markLine: k === 0 ? {symbol: 'none', silent: true, animation: false, data: [limitLine(t, half, 'deadline')]} : undefined,
         })),
       };
     },
@@ -142,7 +173,15 @@ function latenessFigure(groups, state) {
 /** Draws the whole run: the DAGs that kept the workers busy, and the missed deadlines. */
 function timelineFigure(groups, state) {
   return figure({
-    name: 'timeline', height: 268, label: 'Workers in use and missed deadlines over the whole run',
+    name: 'timeline', height: 268, label: 'Workers in use and missed deadlines over the whole run', zooms: true,
+    data() {
+      const {dags, timeline} = groups[state.executor];
+      return {
+        columns: [column('from'), ...dags.flatMap(({name}) => [column(`${name}: workers`), column(`${name}: missed`)])],
+        rows: timeline.busy_ns[0].map((_, i) => ({cells: [timeCell(i * timeline.bin_ns), ...dags.flatMap((dag, d) => [
+          {text: (timeline.busy_ns[d][i] / timeline.bin_ns).toFixed(2), sort: timeline.busy_ns[d][i]}, shareCell(timeline.missed[d][i], timeline.released[d][i])])]})),
+      };
+    },
     caption: 'Above: workers in use, by DAG. Below: share of the jobs released in each interval that missed their deadline '
       + 'or were lost.',
     build(t, width) {
@@ -178,12 +217,12 @@ function timelineFigure(groups, state) {
         series: [
           ...group.dags.map((dag, d) => ({
             type: 'line', name: dag.name, xAxisIndex: 0, yAxisIndex: 0, stack: 'busy', step: 'end', showSymbol: false,
-            lineStyle: {width: 0}, areaStyle: {opacity: 0.85}, itemStyle: {color: colourOf(t, d)},
+            lineStyle: {width: 0}, areaStyle: {opacity: 0.85}, itemStyle: {color: hueOf(t, d).color},
             data: [...line.busy_ns[d], line.busy_ns[d][bins - 1]].map((busy, i) => [time(i), busy / line.bin_ns]),
           })),
           ...group.dags.map((dag, d) => ({
             type: 'line', name: dag.name, xAxisIndex: 1, yAxisIndex: 1, step: 'end', showSymbol: false,
-            lineStyle: {width: 1.5}, areaStyle: {opacity: 0.2}, itemStyle: {color: colourOf(t, d)},
+            lineStyle: {width: 1.5}, areaStyle: {opacity: 0.2}, itemStyle: {color: hueOf(t, d).color},
             data: [...line.missed[d], line.missed[d][bins - 1]].map((missed, i) => [time(i), missed / Math.max(1, line.released[d][i] || 0)]),
           })),
         ],
@@ -192,55 +231,82 @@ function timelineFigure(groups, state) {
   });
 }
 
+/** Returns the next number of one or two digits, for the end of an axis. */
+function roundUp(value) {
+  if (value <= 0) return 1;
+  const unit = 10 ** (Math.floor(Math.log10(value)) - 1);
+  return Number((Math.ceil(value / unit / 5) * 5 * unit).toPrecision(2));
+}
+
 /**
  * Draws one number of every DAG under every executor. `value(row, cell)` returns {at, min, max}, or null without a
- * value.
+ * value; `limit(cell)` the deadline of that number, or null.
  */
-function comparisonFigure({name, title, groups, rows, value, log, format, formatAxis, caption}) {
+function comparisonFigure({name, title, groups, rows, value, limit = () => null, log, format, formatAxis, caption}) {
+  const bars = {barGap: '12%', barMaxWidth: 46};
   return figure({
     name, height: 300, label: title, caption,
+    data: () => ({
+      columns: [column('DAG'), column('executor', '', true), column(title), column('least'), column('most'), column('deadline')],
+      rows: rows.flatMap((row) => row.groups.map((cell, g) => {
+        const {at, min, max} = value(row, cell) || {at: null, min: null, max: null};
+        const shown = (number) => ({text: number === null ? '\u2013' : format(number) || '0', sort: number});
+        return {cells: [row.name, groups[g].label, shown(at), shown(min), shown(max), timeCell(limit(cell))]};
+      })),
+    }),
     build(t, width) {
-      const positive = rows.flatMap((row) => row.groups.map((cell) => value(row, cell))).filter((v) => v !== null && v.at > 0).map((v) => v.at);
-      if (log && positive.length === 0) return 'No job finished.';
+      const positive = rows.flatMap((row) => row.groups.flatMap((cell) => [(value(row, cell) || {at: 0}).at, limit(cell)])).filter((at) => at > 0);
+      if (log && !rows.some((row) => row.groups.some((cell) => value(row, cell) !== null))) return 'No job finished.';
       const floor = log ? 10 ** Math.floor(Math.log10(Math.min(...positive) / 2)) : 0;
       const spread = (row, g) => value(row, row.groups[g]) || {at: null, min: null, max: null};
+      const longest = Math.max(0, ...rows.flatMap((row) => groups.map((_, g) => spread(row, g).max)));
+      // A line in ink, on a bar of any shade.
+      const inked = (shape, style) => [{type: 'line', shape, style: {stroke: t.paper, lineWidth: 4}}, {type: 'line', shape, style: {stroke: t.ink, ...style}}];
       return {
         grid: {left: 8, right: 16, top: 54, bottom: 8, containLabel: true},
-        legend: {},
+        legend: {data: groups.map((group) => group.label)},
         tooltip: {
           trigger: 'item',
           formatter: (item) => {
-            const {at, min, max} = spread(rows[item.dataIndex], item.seriesIndex % groups.length);
-            return tip([`${rows[item.dataIndex].name}, ${groups[item.seriesIndex % groups.length].label}`, at === null ? 'no job finished' : format(at),
-              min === max ? null : `repetitions: ${format(min)} to ${format(max)}`]);
+            const g = item.seriesIndex % groups.length;
+            const {at, min, max} = spread(rows[item.dataIndex], g);
+            const deadline = limit(rows[item.dataIndex].groups[g]);
+            return tip([`${rows[item.dataIndex].name}, ${groups[g].label}`, at === null ? 'no job finished' : format(at),
+              min === max ? null : `repetitions: ${format(min)} to ${format(max)}`, deadline === null ? null : `deadline ${formatTime(deadline)}`]);
           },
         },
         xAxis: {type: 'category', data: rows.map((row) => row.name), axisTick: {show: false}, axisLabel: {color: t.ink, interval: 0}},
         yAxis: {
-          type: log ? 'log' : 'value', min: log ? floor : 0, name: title, nameTextStyle: {align: 'left'},
-          axisLabel: {formatter: formatAxis},
+          type: log ? 'log' : 'value', min: log ? floor : 0, max: log ? Math.max(...positive) * 1.6 : roundUp(1.02 * longest), name: title, nameTextStyle: {align: 'left'},
+          axisLabel: {formatter: formatAxis, showMaxLabel: log ? false : undefined},
         },
         series: [
           ...groups.map((group, g) => ({
-            type: 'bar', name: group.label, barGap: '12%', barMaxWidth: 46, itemStyle: {color: colourOf(t, g), borderRadius: [3, 3, 0, 0]},
+            type: 'bar', name: group.label, ...bars, itemStyle: {...fillOf(t, shadeOf(t, g)), borderRadius: [3, 3, 0, 0]},
             data: rows.map((row) => spread(row, g).at),
             label: {show: groups.length * rows.length * (log ? 78 : 60) <= width, position: 'top', color: t.soft, fontSize: 11, distance: 6,
               formatter: (item) => format(item.value)},
           })),
           ...groups.map((group, g) => ({
-            // A line from the lowest to the highest repetition, over the executor's bar.
+            // The deadline, and a line from the lowest to the highest repetition, over the executor's bar.
             type: 'custom', name: group.label, silent: true, z: 5, data: rows.map((row, i) => [i, spread(row, g).min, spread(row, g).max]),
             renderItem: (params, api) => {
-              const low = api.value(1);
-              const high = api.value(2);
-              if (low === high) return null;
-              const layout = api.barLayout({count: groups.length, barGap: '12%', barMaxWidth: 46})[g];
-              const x = api.coord([api.value(0), high])[0] + layout.offsetCenter;
-              const top = api.coord([api.value(0), high])[1];
-              const bottom = api.coord([api.value(0), Math.max(low, floor)])[1];
-              const stroke = {stroke: t.ink, lineWidth: 1.2};
-              const bar = (y) => ({type: 'line', shape: {x1: x - 4, x2: x + 4, y1: y, y2: y}, style: stroke});
-              return {type: 'group', children: [{type: 'line', shape: {x1: x, x2: x, y1: top, y2: bottom}, style: stroke}, bar(top), bar(bottom)]};
+              const place = api.value(0);
+              const [low, high] = [api.value(1), api.value(2)];
+              const layout = api.barLayout({count: groups.length, ...bars})[g];
+              const x = api.coord([place, floor || 0])[0] + layout.offsetCenter;
+              const y = (number) => api.coord([place, Math.max(number, floor)])[1];
+              const children = [];
+              const deadline = limit(rows[place].groups[g]);
+              if (deadline !== null) {
+                const half = layout.width * 0.56;
+                children.push(...inked({x1: x - half, x2: x + half, y1: y(deadline), y2: y(deadline)}, {lineWidth: 1.8, lineDash: [5, 3]}));
+              }
+              if (low !== high) {
+                const ends = [{x1: x, x2: x, y1: y(high), y2: y(low)}, ...[low, high].map((end) => ({x1: x - 4, x2: x + 4, y1: y(end), y2: y(end)}))];
+                children.push(...ends.flatMap((shape) => inked(shape, {lineWidth: 1.2})));
+              }
+              return children.length === 0 ? null : {type: 'group', children};
             },
           })),
         ],

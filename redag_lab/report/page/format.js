@@ -39,14 +39,58 @@ function formatCountAndShare(part, whole) {
   return part === 0 ? '0' : `${formatCount(part)} (${formatPercent(part / whole)})`;
 }
 
+// What the names and numbers of the document mean. The keys are those that the program writes, in the order of its
+// enumerations; a test compares them (redag_lab/report/page_test.cpp).
 const DRIVERS = {
-  simulator: 'in virtual time', threads: 'on threads of this machine', ros: 'under ROS 2, as the executor saw it',
-  ros_nodes: 'under ROS 2, as the nodes saw it', ros2: 'under ROS 2',
+  simulator: 'in virtual time',
+  threads: 'on threads of this machine',
+  ros: 'under ROS 2, as the executor saw it',
+  ros_nodes: 'under ROS 2, as the nodes saw it',
+  ros2: 'under ROS 2',  // of a plan; its runs are of the two before
 };
-// Short names, for tables.
-const WORLDS = {simulator: 'virtual time', threads: 'threads', ros: 'ROS 2', ros_nodes: 'ROS 2', ros2: 'ROS 2'};
-const OUTCOMES = ['in progress', 'finished', 'skipped', 'aborted'];
-const REASONS = [
-  '', 'not started before the next release', 'not ready before the next release', 'its queue was full',
-  'its DAG was full', 'its task was removed', 'exception', 'budget used up', 'no data',
-];
+const WORLDS = {
+  simulator: 'virtual time',
+  threads: 'threads',
+  ros: 'ROS 2',
+  ros_nodes: 'ROS 2',
+  ros2: 'ROS 2',
+};
+const OUTCOMES = {
+  in_flight: 'in progress',
+  finished: 'finished',
+  skipped: 'skipped',
+  aborted: 'aborted',
+};
+const REASONS = {
+  none: '',
+  overrun: 'not started before the next release',
+  precedence: 'not ready before the next release',
+  queue_full: 'its queue was full',
+  dag_full: 'its DAG was full',
+  removed: 'its task was removed',
+  exception: 'exception',
+  budget: 'budget used up',
+  no_data: 'no data',
+  degraded: 'its DAG was degraded in HI mode',
+};
+const ENDS = {
+  finished: 'finished here',
+  aborted: 'aborted here',
+  preempted: 'preempted here',
+  open: 'continues',
+};
+const TONES = {
+  good: '\u2713',
+  bad: '\u2717',
+  caution: '!',
+  plain: '\u2022',
+};
+/** Returns the words for a value of an enumeration. */
+const wordsAt = (words, value) => Object.values(words)[value];
+/** Returns the value of an enumeration that has this name. */
+const valueOf = (words, name) => Object.keys(words).indexOf(name);
+
+// Cells of tables, with the number by which they are sorted.
+const timeCell = (ns, rest = {}) => ({text: formatTime(ns), sort: ns ?? null, ...rest});
+const countCell = (count, rest = {}) => ({text: formatCount(count), sort: count, ...rest});
+const shareCell = (part, whole, rest = {}) => ({text: formatCountAndShare(part, whole), sort: whole === 0 ? null : part / whole, ...rest});

@@ -5,8 +5,14 @@
 
 const report = JSON.parse(document.getElementById('data').textContent);
 const {groups} = report;
-const state = {executor: 0, task: null, tail: false, log: false, view: 0, rows: 'tasks', unfolded: false, why: 0, unexplained: null};
+const state = {executor: 0, task: null, tail: false, log: false, view: 0, rows: 'tasks', why: null};
 const several = groups.length > 1;
+
+/** Returns the sentences of a verdict, without what its headline says. */
+const verdictOf = (group) => verdictList(group.verdict.map(({tone, text}) => {
+  const said = `${group.headline.text}: `;
+  return {tone, text: text.startsWith(said) ? text[said.length].toUpperCase() + text.slice(said.length + 1) : text};
+}));
 
 function header() {
   const run = groups[0].run;
@@ -21,13 +27,14 @@ function header() {
   return [
     element('div.head', {}, element('h1', {}, report.title), element('div.controls', {}, themeChoice())),
     element('p.facts', {}, facts.join(' \u00b7 ')),
+    headline(report.headline),
   ];
 }
 
 function comparisonSection() {
   if (!several) return [];
   const rows = report.comparison.dags;
-  const parts = [element('h2', {id: 'comparison'}, 'Executors side by side')];
+  const parts = [heading(2, 'comparison', 'Executors side by side')];
   if (rows.length === 0) return [...parts, element('p', {}, 'The runs have no DAG in common.')];
   const figures = [
     comparisonFigure({
@@ -36,9 +43,10 @@ function comparisonSection() {
       caption: 'Share of released jobs that were late, skipped or aborted, over all repetitions. Lines: from the lowest to the highest repetition.',
     }),
     comparisonFigure({
-      name: 'p99', title: 'p99 end to end', groups, rows, value: (row, cell) => cell.p99_ns && {...cell.p99_ns, at: cell.p99_ns.median}, log: true,
+      name: 'p99', title: 'p99 end to end', groups, rows, limit: (cell) => cell.deadline_ns, value: (row, cell) => cell.p99_ns && {...cell.p99_ns, at: cell.p99_ns.median}, log: true,
       format: (ns) => (ns > 0 ? formatTime(Number(ns.toPrecision(3))) : ''), formatAxis: (ns) => formatAxisTime(ns, ns),
-      caption: '99th percentile of the end-to-end response time (logarithmic): median over the repetitions. Lines: from the lowest to the highest repetition.',
+      caption: '99th percentile of the end-to-end response time (logarithmic): median over the repetitions. Lines: from the lowest to the highest repetition. '
+        + 'Dashed: the end-to-end deadline, where the workload states one.',
     }),
   ];
   return [...parts, element('div.side-by-side', {}, ...figures.map((fig) => fig.box)), filled(() => comparisonTable(groups, rows))];
@@ -66,7 +74,7 @@ function detailSections() {
   const redraw = () => { responses.draw(); lateness.draw(); };
 
   const pick = several ? [element('div.row.executors', {}, element('span.soft', {}, 'Details of'),
-    choice(groups.map((group) => group.label), 0, (i) => {
+    choice('Executor', groups.map((group) => group.label), 0, (i) => {
       const name = state.task === null ? null : taskName(groups[state.executor], state.task);
       state.executor = i;
       // Keeps the chosen task if the other executor has it.
@@ -82,33 +90,29 @@ function detailSections() {
 
   return [
     ...pick,
-    several ? filled(() => verdictList(groups[state.executor].verdict)) : null,
-    element('h2', {id: 'dags'}, 'DAGs'), filled(() => dagTable(groups[state.executor])),
-    element('h2', {id: 'tasks'}, 'Tasks: measured times and bounds'),
+    several ? filled(() => [element(`p.headline.${groups[state.executor].headline.tone}`, {}, ...headlineParts(groups[state.executor].headline)), verdictOf(groups[state.executor])]) : null,
+    heading(2, 'dags', 'DAGs'), filled(() => dagTable(groups[state.executor])),
+    heading(2, 'tasks', 'Tasks: measured times and bounds'),
     filled(() => {
-      const {bounds} = groups[state.executor];
-      return element('p.soft', {}, bounds.absent ? `No bounds: ${bounds.absent}.`
-        : `Bounds for ${bounds.assumes}. The tooltip of a bound names its method.`);
+      const {bounds, tasks} = groups[state.executor];
+      const order = tasks.length > MOST_ROWS_AT_ONCE ? ' The tasks closest to a miss come first.' : '';
+      return element('p.soft', {}, `${bounds.absent ? `No bounds: ${bounds.absent}.`
+        : `Bounds for ${bounds.assumes}. The tooltip of a bound names its method.`}${order}`);
     }),
-    filled(() => taskTable(groups[state.executor], state.unfolded, () => {
-      state.unfolded = true;
-      refill();
-    })),
-    element('h2', {id: 'responses'}, 'Response times'),
+    filled(() => taskTable(groups[state.executor])),
+    heading(2, 'responses', 'Response times'),
     element('div.row.controls', {}, taskChoice(redraw),
-      choice(['distribution', 'tail'], 0, (i) => { state.tail = i === 1; responses.draw(); }),
-      choice(['linear time', 'logarithmic'], 0, (i) => { state.log = i === 1; responses.draw(); })),
+      choice('Curve', ['distribution', 'tail'], 0, (i) => { state.tail = i === 1; responses.draw(); }),
+      choice('Time axis', ['linear time', 'logarithmic'], 0, (i) => { state.log = i === 1; responses.draw(); })),
     responses.box,
-    element('h3', {}, 'Lateness'), lateness.box,
+    heading(3, 'lateness', 'Lateness'), lateness.box,
     ...why.nodes,
-    element('h2', {id: 'schedule'}, 'Schedule'), timeline.box,
-    element('h3', {}, 'Schedule in detail'),
+    heading(2, 'schedule', 'Schedule'), timeline.box,
+    heading(3, 'detail', 'Schedule in detail'),
     element('div.row.controls', {},
       filled(() => dropdown('show', viewNames(groups[state.executor]), state.view, (i) => { state.view = i; schedule.look(); })),
-      choice(['tasks', 'workers'], 0, (i) => { state.rows = i === 1 ? 'workers' : 'tasks'; schedule.draw(); }),
-      element('span.switch', {}, element('button', {type: 'button', 'aria-label': 'zoom in', onclick: () => schedule.zoom(2)}, '+'),
-        element('button', {type: 'button', 'aria-label': 'zoom out', onclick: () => schedule.zoom(0.5)}, '\u2212'))),
-    filled(() => element('p.keys.soft', {}, ...groups[state.executor].dags.slice(0, 24).map((dag, d) => element('span', {}, swatch(theme(), d), dag.name)))),
+      choice('Rows', ['tasks', 'workers'], 0, (i) => { state.rows = i === 1 ? 'workers' : 'tasks'; schedule.draw(); })),
+    filled(() => element('p.keys.soft', {}, ...groups[state.executor].dags.slice(0, 24).map((dag, d) => element('span', {}, swatch(hueOf(theme(), d)), dag.name)))),
     schedule.box,
   ];
 }
@@ -139,13 +143,14 @@ function howItWasRun() {
     rows.push(...provenanceRows(runs[0].provenance));
     if (run.lost_events > 0) rows.push(['Lost events', formatCount(run.lost_events)]);
     return [element('dl', {}, ...rows.flatMap(([name, value]) => [element('dt', {}, name), element('dd', {}, value)])),
-      element('details', {}, element('summary', {}, 'The workload'), element('pre', {}, run.workload))];
+      element('details', {}, element('summary', {}, 'The workload'), element('pre', {tabindex: '0'}, run.workload))];
   };
   return [
-    element('h2', {id: 'how'}, 'How the runs were made'), filled(facts), runTable(groups),
-    ...(report.cuts.length === 0 ? [] : [element('h3', {}, 'What is not shown'), element('ul.soft', {}, ...cuts().map((cut) => element('li', {}, cut)))]),
+    heading(2, 'how', 'How the runs were made'), filled(facts), runTable(groups),
+    ...(report.cuts.length === 0 ? [] : [heading(3, 'cuts', 'What is not shown'), element('ul.soft', {}, ...cuts().map((cut) => element('li', {}, cut)))]),
     pageFooter(report),
   ];
 }
 
-startPage([...header(), verdictList(several ? report.comparison.words : groups[0].verdict), ...comparisonSection(), ...detailSections(), ...howItWasRun()]);
+startPage([...header(), several ? verdictList(report.comparison.words) : verdictOf(groups[0]),
+  element('details', {}, element('summary', {}, 'Colours and lines'), filled(() => colourKey('DAG', 'executor'))), ...comparisonSection(), ...detailSections(), ...howItWasRun()]);

@@ -3,9 +3,8 @@
 
 // Draws the schedule: which job ran where and when. Rows are tasks (with releases, deadlines and misses) or workers.
 
-const OPEN = 3;       // Slice::End
-const PREEMPTED = 2;
-const SKIPPED = 2;    // JobOutcome
+const [OPEN, PREEMPTED] = [valueOf(ENDS, 'open'), valueOf(ENDS, 'preempted')];
+const [FINISHED, SKIPPED] = [valueOf(OUTCOMES, 'finished'), valueOf(OUTCOMES, 'skipped')];
 const ROW_HEIGHT = 30;
 const MOST_ROWS = 64;
 const ROOM_FOR_ARROWS = 9;  // pixels from release to deadline; with fewer, only misses are marked
@@ -51,23 +50,35 @@ function scheduleFigure(groups, state, explain) {
       .sort((a, b) => a - b);
   }
 
+  function outcomeOf(jobs, j) {
+    const reason = wordsAt(REASONS, jobs.reason[j]);
+    return `${wordsAt(OUTCOMES, jobs.outcome[j])}${reason ? `: ${reason}` : ''}`;
+  }
+
   function describeJob(c, j) {
     const {jobs} = c;
     const task = c.group.tasks[jobs.task[j]];
-    const reason = REASONS[jobs.reason[j]];
-    const finished = jobs.finish[j] !== null && jobs.outcome[j] === 1;
+    const finished = jobs.finish[j] !== null && jobs.outcome[j] === FINISHED;
     const late = finished ? jobs.finish[j] - jobs.deadline[j] : 0;
     return [
       `${taskName(c.group, jobs.task[j])} #${jobs.number[j]}`,
       `released ${formatTime(c.from + jobs.release[j])}, deadline ${formatTime(jobs.deadline[j])} later`,
       finished ? `response ${formatTime(jobs.finish[j])}${task.bound_ns ? `, bound ${formatTime(task.bound_ns)}` : ''}`
-        : `${OUTCOMES[jobs.outcome[j]]}${reason ? `: ${reason}` : ''}`,
+        : outcomeOf(jobs, j),
       late > 0 ? `late by ${formatTime(late)}` : null,
     ];
   }
 
   const fig = figure({
-    name: 'schedule', height: 300, canvas: true, label: 'Schedule',
+    name: 'schedule', height: 300, canvas: true, label: 'Schedule', zooms: true,
+    data() {
+      const {group, jobs, from} = contents();
+      return {
+        columns: [column('job'), column('released'), column('deadline'), column('finished after'), column('outcome', '', true)],
+        rows: jobs.task.map((task, j) => ({cells: [`${taskName(group, task)} #${jobs.number[j]}`, timeCell(from + jobs.release[j]), timeCell(jobs.deadline[j]),
+          timeCell(jobs.finish[j]), {text: `${outcomeOf(jobs, j)}${jobs.missed[j] ? ', missed' : ''}`, kind: jobs.missed[j] ? 'missed' : ''}]})),
+      };
+    },
     caption: 'Drag to move; zoom with Ctrl and the wheel, or with two fingers. Colour: DAG; \u2191 release; \u2193 deadline; red: missed deadline; '
       + `\u00d7 lost job. A slice that ends with a notch was preempted. A click explains a job. At most ${MOST_ROWS} rows are shown, those with misses first.`,
     build(t) {
@@ -87,7 +98,7 @@ function scheduleFigure(groups, state, explain) {
             const j = c.slices.job[i];
             const job = j === null ? [taskName(c.group, c.slices.task[i])] : describeJob(c, j);
             return tip([...job, `${workerName(c.group, c.slices.worker[i])}: ${formatTime(c.slices.length[i])} from ${formatTime(item.value[1])}`,
-              ['finished here', 'aborted here', 'preempted here', 'continues'][c.slices.how[i]]]);
+              wordsAt(ENDS, c.slices.how[i])]);
           },
         },
         dataZoom: [
@@ -95,7 +106,7 @@ function scheduleFigure(groups, state, explain) {
             zoomOnMouseWheel: 'ctrl', preventDefaultMouseMove: false},
           {type: 'slider', startValue: zoom[0], endValue: zoom[1], filterMode: 'weakFilter', height: 18, bottom: 4,
             showDetail: false, brushSelect: false, borderColor: t.line, backgroundColor: t.raised,
-            fillerColor: t.dark ? 'rgba(108,178,255,.18)' : 'rgba(11,98,196,.14)', handleStyle: {color: t.paper, borderColor: t.soft},
+            fillerColor: t.dark ? 'rgba(228,232,237,.18)' : 'rgba(27,31,36,.14)', handleStyle: {color: t.paper, borderColor: t.soft},
             moveHandleStyle: {color: t.line}},
         ],
         xAxis: {
@@ -126,15 +137,15 @@ function scheduleFigure(groups, state, explain) {
               };
               if (x1 - x0 < ROOM_FOR_ARROWS) {
                 if (!bad || x1 < left || x1 > left + width) return null;
-                return {type: 'line', shape: {x1, x2: x1, y1: y + 2, y2: y + half}, style: {stroke: t.bad, lineWidth: 1, opacity: 0.7}};
+                return {type: 'line', shape: {x1, x2: x1, y1: y + 2, y2: y + half}, style: {stroke: t.missed, lineWidth: 1, opacity: 0.7}};
               }
               arrow(x0, true, t.soft);
-              arrow(x1, false, bad ? t.bad : t.soft);
+              arrow(x1, false, bad ? t.missed : t.soft);
               const lost = c.jobs.outcome[i] >= SKIPPED && bad;
               if (lost) {
                 const x = Math.max(x0 + 7, left + 5);
                 if (x < left + width - 4) children.push({type: 'path', shape: {pathData: 'M0 0L8 8M8 0L0 8', x: x - 4, y: y - 4, width: 8, height: 8},
-                  style: {stroke: t.bad, lineWidth: 2, fill: 'none'}});
+                  style: {stroke: t.missed, lineWidth: 2, fill: 'none'}});
               }
               return children.length === 0 ? null : {type: 'group', children};
             },
@@ -149,9 +160,9 @@ function scheduleFigure(groups, state, explain) {
               const box = clip(params, {x: x0, y: y - height / 2, width: Math.max(1, x1 - x0), height});
               if (!box) return null;
               const bad = missed(i);
-              const colour = colourOf(t, c.group.tasks[c.slices.task[i]].dag);
+              const colour = hueOf(t, c.group.tasks[c.slices.task[i]].dag).color;
               const children = [{type: 'rect', shape: {...box, r: box.width > 4 ? 2 : 0},
-                style: {fill: colour, opacity: c.slices.how[i] === OPEN ? 0.55 : 0.92, stroke: bad ? t.bad : 'transparent', lineWidth: bad && box.width > 2 ? 2 : 0}}];
+                style: {fill: colour, opacity: c.slices.how[i] === OPEN ? 0.55 : 0.92, stroke: bad ? t.missed : 'transparent', lineWidth: bad && box.width > 2 ? 2 : 0}}];
               if (c.slices.how[i] === PREEMPTED && box.width > 5) {
                 const right = box.x + box.width;
                 children.push({type: 'polygon', shape: {points: [[right + 0.5, box.y], [right - 4, y], [right + 0.5, box.y + height]]}, style: {fill: t.paper}});
@@ -188,12 +199,6 @@ function scheduleFigure(groups, state, explain) {
     return [c.from, until > c.from ? until : c.to];
   }
 
-  fig.zoom = (factor) => {
-    const middle = (zoom[0] + zoom[1]) / 2;
-    const half = (zoom[1] - zoom[0]) / 2 / factor;
-    zoom = [middle - half, middle + half];
-    fig.chart().dispatchAction({type: 'dataZoom', startValue: zoom[0], endValue: zoom[1]});
-  };
   fig.look = () => {
     zoom = null;
     fig.draw();

@@ -1,15 +1,17 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Explains misses: the causes of the run, and where the time of one job went. A job is chosen in the list, or by a
-// click on it in the schedule.
+// Explains misses: the causes of the run, the worst jobs, and where the time of one job went. A job is chosen in the
+// list, or by a click on it in the schedule. The program chose and explained them; nothing is judged here.
+
+const MOST_LISTED_AT_ONCE = 12;
 
 function causesTable({causes}) {
   const columns = [
     column('cause'), column('jobs', 'Jobs that it delayed'), column('mainly', 'Jobs that it delayed more than any other cause'),
     column('time', 'Its time in all these jobs'),
   ];
-  return element('div.why', {}, table(columns, causes.map((cause) => ({cells: [{text: cause.text, title: cause.text}, formatCount(cause.jobs), formatCount(cause.main), formatTime(cause.time_ns)]}))));
+  return element('div.why', {}, table('Causes', columns, causes.map((cause) => ({cells: [cause.text, countCell(cause.jobs), countCell(cause.main), timeCell(cause.time_ns)]}))));
 }
 
 /** Returns a bar of a job's parts, as long as they took. */
@@ -21,68 +23,88 @@ function partsBar(job) {
     const x = 100 * at / Math.max(1, job.length_ns);
     at += length;
     const width = 100 * length / Math.max(1, job.length_ns);
-    return svgElement('rect', {x: x.toFixed(3), y: 0, width: width.toFixed(3), height: 16, fill: work[i] ? t.soft : t.caution,
+    return svgElement('rect', {x: x.toFixed(3), y: 0, width: width.toFixed(3), height: 16, fill: work[i] ? t.soft : t.delay,
       opacity: work[i] || i % 2 === 0 ? 1 : 0.6}, svgElement('title', {}, `${text[i]}: ${formatTime(length)}`));
   });
   return svgElement('svg', {class: 'parts', viewBox: '0 0 100 16', preserveAspectRatio: 'none', role: 'img',
-    'aria-label': `Parts of ${formatTime(job.length_ns)}`}, ...parts);
+    'aria-label': `Parts of ${formatTime(job.length_ns)}; the table below lists them`}, ...parts);
 }
 
 function partsTable(job) {
   const {begin_ns: begins, length_ns: lengths, text, work} = job.parts;
   const columns = [column(job.end_to_end ? 'since its data began' : 'since its release'), column('nanoseconds'), column('share'), column('what happened', '', true)];
   const share = (length) => formatPercent(length / Math.max(1, job.length_ns));
-  const rows = lengths.map((length, i) => ({cells: [begins[i] === null ? '' : formatTime(begins[i]), formatCount(length), share(length),
+  const rows = lengths.map((length, i) => ({cells: [begins[i] === null ? '\u2013' : formatTime(begins[i]), formatCount(length), share(length),
     {text: text[i], kind: work[i] ? '' : 'delay'}]}));
-  rows.push({first: true, cells: ['', formatCount(job.length_ns), share(job.length_ns), 'in all']});
-  return element('div.why', {}, table(columns, rows));
+  rows.push({first: true, cells: ['in all', formatCount(job.length_ns), share(job.length_ns), '']});
+  return element('div.why', {}, table('Parts of the job', columns, rows, {sortable: false, most: Infinity}));
 }
 
-/** Returns the section and a function that shows a job in it: show(task, number). */
+/** Returns the section and a function that shows a job in it: show(task, number, missed). */
 function whySection(groups, state) {
   const why = () => groups[state.executor].why;
-  const chosen = () => why().jobs[Math.min(state.why, why().jobs.length - 1)];
-  const panel = place(() => {
-    if (state.unexplained) return [element('p.soft', {}, state.unexplained)];
-    const job = chosen();
-    if (!job) return [];
-    return [element(job.missed ? 'p.job.bad' : 'p.job', {}, job.text), partsBar(job), partsTable(job)];
-  });
-  const choose = (i) => {
-    state.why = i;
-    state.unexplained = null;
-    panel.refill();
-  };
-  const list = place(() => dropdown('job', why().jobs.map(({text}) => text), state.why, choose));
+  const nameOf = (task, number) => `${taskName(groups[state.executor], task)}#${number}`;
+  const command = (name) => `redag why ${groups[state.executor].runs[0].path} ${name}`;
+  // The chosen job; at first the worst one.
+  function chosen() {
+    const {worst} = why();
+    return state.why || (worst.task.length === 0 ? null : {task: worst.task[0], number: worst.number[0], missed: why().misses > 0});
+  }
+  const isChosen = (task, number) => chosen() !== null && chosen().task === task && chosen().number === number;
+  const panel = element('div', {'aria-live': 'polite'});
+  function fillPanel() {
+    if (chosen() === null) return [];
+    const job = why().jobs.find(({task, number}) => isChosen(task, number));
+    if (job) return [element(job.missed ? 'p.job.missed' : 'p.job', {}, job.text), partsBar(job), partsTable(job)];
+    const name = nameOf(chosen().task, chosen().number);
+    return [element('p.soft', {}, `${name} ${chosen().missed ? 'missed its deadline' : 'met its deadline'} and is not among the jobs explained here: ${command(name)}`)];
+  }
+
+  function show(task, number, missed) {
+    state.why = {task, number, missed};
+    const hadFocus = list.contains(document.activeElement);
+    list.refill();
+    if (hadFocus) list.querySelector('tr[aria-current] button').focus();
+    panel.replaceChildren(...fillPanel());
+    panel.scrollIntoView({block: 'nearest'});
+  }
+
   const intro = place(() => {
     const {misses, explained} = why();
     const words = misses === 0 ? 'No deadline was missed in this run. These are the jobs that came closest, and what took their time.'
       : `${formatCount(misses)} job${misses === 1 ? '' : 's'} missed a deadline in this run. ${misses > explained ? `The causes cover the worst ${formatCount(explained)}. ` : ''}`
-        + 'A click on a job in the schedule below explains it here.';
+        + 'A job chosen in the list, or clicked on in the schedule, is explained below the list.';
     return [element('p.soft', {}, words)];
   });
   const causes = place(() => (why().causes.length === 0 ? [] : [causesTable(why())]));
-  const all = [intro, causes, list, panel];
+  const list = place(() => {
+    const {worst, misses} = why();
+    const columns = [column('job'), column('late by', 'After its deadline; negative: time to spare'), column('outcome', '', true), column('released', 'Since the start of the run'),
+      column('main cause', '', true)];
+    const rows = worst.task.map((task, i) => {
+      const name = nameOf(task, worst.number[i]);
+      const missed = misses > 0;
+      const reason = wordsAt(REASONS, worst.reason[i]);
+      return {current: isChosen(task, worst.number[i]), cells: [
+        {text: element('button.link', {type: 'button', onclick: () => show(task, worst.number[i], missed)}, ...breakable(name)), sort: name},
+        timeCell(worst.lateness[i], {kind: lateKind(missed)}),
+        `${wordsAt(OUTCOMES, worst.outcome[i])}${reason ? `: ${reason}` : ''}`, timeCell(worst.since[i]), worst.main[i] || 'lost at its release']};
+    });
+    return [element('div.why', {}, table('The worst jobs', columns, rows, {most: MOST_LISTED_AT_ONCE, total: Math.max(misses, rows.length)})),
+      misses > rows.length ? element('p.soft', {}, `All of them: ${command('--all')}`) : null].filter(Boolean);
+  });
   const refillAll = () => {
-    state.why = 0;
-    state.unexplained = null;
-    all.forEach((node) => node.refill());
+    [intro, causes, list].forEach((node) => node.refill());
+    panel.replaceChildren(...fillPanel());
   };
-  themed.push(() => panel.refill());
+  themed.push(refillAll);
   refillAll();
   return {
-    nodes: [element('h2', {id: 'why'}, 'Why were jobs late?'), intro, causes, element('div.row.controls', {}, list), panel],
-    refill: refillAll,
-    show(task, number, missed) {
-      const name = `${taskName(groups[state.executor], task)}#${number}`;
-      const i = why().jobs.findIndex((job) => job.task === task && job.number === number);
-      if (i >= 0) state.why = i;
-      const path = groups[state.executor].runs[0].path;
-      state.unexplained = i >= 0 ? null
-        : `${name} ${missed ? 'missed its deadline' : 'met its deadline'} and is not among the jobs explained here: redag why ${path} ${name}`;
-      list.refill();
-      panel.refill();
-      panel.scrollIntoView({block: 'nearest'});
+    nodes: [heading(2, 'why', 'Why were jobs late?'), intro, causes, heading(3, 'worst', 'The worst jobs'), list, panel],
+    refill() {
+      state.why = null;
+      refillAll();
     },
+    show,
   };
 }

@@ -1,0 +1,119 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// The page of `redag serve`: which executor is watched, and what is said about it. The server sends a state each second.
+
+const view = {filter: '', column: null, dagsOnly: false, whole: false};
+const live = {source: null, chosen: null, frame: null, list: [], gone: false, lost: false};
+
+const idOf = ({pid, number}) => (number === 0 ? String(pid) : `${pid}.${number}`);
+const nameOf = (executor) => `${executor.name ?? 'not readable'} \u2013 ${executor.program ?? ''} ${idOf(executor)}`;
+const inWords = (ns) => (ns < 60e9 ? `${Math.floor(ns / 1e9)} s` : ns < 3600e9 ? `${Math.floor(ns / 60e9)} min` : `${Math.floor(ns / 3600e9)} h ${Math.floor(ns % 3600e9 / 60e9)} min`);
+
+const title = element('h1', {}, 'redag live');
+const badge = element('span.state', {role: 'status'});
+const facts = element('p.facts');
+const misses = element('p', {id: 'headline'});
+const alarm = element('p.bad-text', {role: 'alert'});
+const picker = element('select', {'aria-label': 'executor', onchange: () => choose(picker.value)});
+const pick = element('label', {}, 'executor', picker);
+const bars = workerBars();
+const course = courseFigure();
+const rows = liveTable(view, () => show());
+const content = element('div');
+
+/** Returns a button that stays pressed. */
+function toggle(text, help, key) {
+  const button = element('button', {type: 'button', title: help, 'aria-pressed': 'false', onclick: () => {
+    view[key] = !view[key];
+    button.setAttribute('aria-pressed', String(view[key]));
+    show();
+  }}, text);
+  return button;
+}
+
+/** Returns what is wrong with the executor, or with the connection to it; '' if nothing. */
+function trouble() {
+  const {frame, gone, lost} = live;
+  if (lost) return 'no connection';
+  if (gone) return 'ended';
+  const patience = Math.max(1e9, 4 * frame.interval_ns);
+  return frame.age_ns > patience ? `no update for ${inWords(frame.age_ns)}` : '';
+}
+
+function show() {
+  const {frame, list} = live;
+  picker.replaceChildren(...list.map((executor) => element('option', {value: idOf(executor)}, nameOf(executor))));
+  if (frame) picker.value = idOf(frame);
+  pick.hidden = list.every((executor) => frame !== null && idOf(executor) === idOf(frame));  // nothing else to watch
+  if (!frame) {
+    content.hidden = true;
+    setText(facts, live.lost ? 'The connection to redag serve is lost. The page tries again.'
+      : list.length > 0 ? 'The live page of this executor cannot be read.'
+        : 'No running executor publishes a live page. The page waits for one.');
+    return;
+  }
+  content.hidden = false;
+  setText(title, frame.name);
+  document.title = `${frame.name} \u2013 redag live`;
+  const problem = trouble();
+  setText(badge, problem || 'running');
+  setClass(badge, problem ? 'state trouble' : 'state running');
+  setText(facts, [`${frame.program} ${idOf(frame)}`, frame.driver, `${frame.workers} worker${frame.workers === 1 ? '' : 's'}`, `preemption ${frame.preemption}`,
+    frame.policy, `up ${inWords(frame.up_ns)}`, `live page ${formatPercent(frame.page_cpu_ns / frame.up_ns)} of a processor`].join(' \u00b7 '));
+  const total = frame.dags.reduce((sum, dag) => ({jobs: sum.jobs + dag.finished, rate: sum.rate + dag.rate, missed: sum.missed + dag.misses, lately: sum.lately + dag.recent.misses}),
+    {jobs: 0, rate: 0, missed: 0, lately: 0});
+  const verdict = total.missed === 0 ? 'No deadline missed' : `${formatCount(total.missed)} deadlines missed, ${formatCount(total.lately)} in the last ${inWords(frame.window_ns)}`;
+  setText(misses, `${verdict} \u2013 ${formatCount(total.jobs)} jobs, ${Number(total.rate.toPrecision(4))}/s`);
+  setClass(misses, total.lately > 0 ? 'bad-text' : total.missed > 0 ? 'near-text' : 'good-text');
+  setText(alarm, [frame.alert, problem.startsWith('no update') ? 'The process is stopped, or gets no processor.' : null,
+    frame.left_out > 0 ? `${formatCount(frame.left_out)} more tasks do not fit the live page.` : null].filter(Boolean).join(' '));
+  bars.update(frame);
+  rows.update(frame);
+}
+
+function receive({data}) {
+  const {list, frame} = JSON.parse(data);
+  live.list = list.executors;
+  live.lost = false;
+  live.gone = frame === null;
+  if (frame !== null) {
+    if (live.frame === null || live.frame.pid !== frame.pid || live.frame.number !== frame.number) course.clear();
+    live.frame = frame;
+  }
+  show();
+  if (frame !== null) course.update(frame);
+  document.documentElement.dataset.ready = 'true';
+}
+
+/** Watches an executor, or the first one. */
+function watch(executor) {
+  if (live.source !== null) live.source.close();
+  live.source = new EventSource(executor === null ? 'events' : `events?executor=${encodeURIComponent(executor)}`);
+  live.source.onmessage = receive;
+  live.source.onerror = () => {
+    live.lost = true;
+    show();
+    // A browser gives up where the answer was an error, such as too many windows.
+    if (live.source.readyState === EventSource.CLOSED) setTimeout(() => watch(live.chosen), 3000);
+  };
+}
+
+function choose(executor) {
+  live.chosen = executor;
+  live.frame = null;
+  watch(executor);
+}
+
+const filter = element('input', {type: 'search', placeholder: 'filter names', 'aria-label': 'filter names', oninput: () => { view.filter = filter.value; if (live.frame) show(); }});
+content.append(misses, alarm, bars.node, element('h2', {id: 'table'}, 'DAGs and tasks'),
+  element('div.row.controls', {}, filter, toggle('since the start', 'Response times of the whole run, instead of the last seconds', 'whole'), toggle('only DAGs', 'Without their tasks', 'dagsOnly')),
+  rows.node, element('h2', {id: 'course'}, 'Response times lately'), course.box);
+content.hidden = true;
+document.documentElement.dataset.theme = themeName();
+document.getElementById('report').append(
+  element('div.head', {}, element('div.title', {}, title, badge), element('div.controls', {}, themeChoice())), facts, element('div.row', {}, pick), content,
+  element('footer', {}, `This page is served by redag serve on this machine; it changes nothing. Chart: Apache ECharts ${echarts.version} (Apache License 2.0).`));
+applyTheme();
+show();
+watch(null);

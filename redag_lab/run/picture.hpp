@@ -1,0 +1,22 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// Draws the picture of a recorded run.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "redag/base/result.hpp"
+#include "redag/trace/events_file.hpp"
+#include "redag_analysis/metrics/kernel_record.hpp"
+
+namespace redag::lab {
+
+/// Reads the rest of `events` and writes the file `picture` (metrics::PerfettoWriter), in memory that does not grow
+/// with the run. `kernel` may be null. `is_stopped` is asked now and then: no picture is written once it is true, which
+/// is an error.
+[[nodiscard]] Result<void> draw_picture(trace::EventsReader &events, const std::string &picture,
+                                        const metrics::KernelRecord *kernel, const std::function<bool()> &is_stopped);
+
+}  // namespace redag::lab

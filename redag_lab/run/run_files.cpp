@@ -1,0 +1,75 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+#include "redag_lab/run/run_files.hpp"
+
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+namespace redag::lab {
+namespace {
+
+constexpr std::string_view kJobsFile = "jobs.csv";
+constexpr std::string_view kPictureFile = "trace.pftrace";
+
+std::string_view events_name(bool as_text) { return as_text ? trace::kEventsTextFile : trace::kEventsFile; }
+
+}  // namespace
+
+Result<RunFiles> RunFiles::create(const FilesOptions &options, const trace::RunInfo &run) {
+  const auto path = [&](std::string_view name) { return options.folder + "/" + std::string(name); };
+  auto events = trace::EventsWriter::create(path(events_name(options.events_as_text)), run);
+  if (!events) return tl::unexpected<Diagnostics>(std::move(events.error()));
+  auto jobs = metrics::JobsCsvWriter::create(path(kJobsFile), run.workload);
+  if (!jobs) return tl::unexpected<Diagnostics>(std::move(jobs.error()));
+  RunFiles files(options, run, *std::move(events), *std::move(jobs));
+  if (options.picture == Picture::Never) return files;
+  auto picture = metrics::PerfettoWriter::create(path(kPictureFile), *files.run_);
+  if (!picture) return tl::unexpected<Diagnostics>(std::move(picture.error()));
+  files.picture_.emplace(*std::move(picture));
+  return files;
+}
+
+void RunFiles::add(std::span<const JobEvent> events) {
+  events_.add(events);
+  jobs_.add(events);
+  count_ += events.size();
+  if (options_.picture == Picture::Auto && picture_ && count_ > kMostPicturedEvents) {
+    picture_.reset();
+    lacks_picture_ = true;
+  }
+  if (picture_) picture_->add(events);
+}
+
+Diagnostics RunFiles::commit(Time end, std::uint64_t lost_events) {
+  Diagnostics problems;
+  const auto keep = [&problems](const Result<void> &written) {
+    if (!written) problems.insert(problems.end(), written.error().begin(), written.error().end());
+    return written.has_value();
+  };
+  const auto remove_stale = [this](std::string_view name) {
+    std::error_code ignored;
+    std::filesystem::remove(path(name), ignored);
+  };
+  if (keep(events_.commit(end, lost_events))) remove_stale(events_name(!options_.events_as_text));
+  keep(jobs_.commit());
+  if (picture_) {
+    keep(picture_->commit(end));
+  } else {
+    remove_stale(kPictureFile);
+  }
+  return problems;
+}
+
+std::string RunFiles::events_path() const { return path(events_name(options_.events_as_text)); }
+
+std::string RunFiles::picture_path() const { return path(kPictureFile); }
+
+std::string RunFiles::names() const {
+  std::string names = std::string(kJobsFile) + ", " + std::string(events_name(options_.events_as_text));
+  if (picture_) names += ", " + std::string(kPictureFile);
+  return names;
+}
+
+}  // namespace redag::lab

@@ -1,0 +1,178 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// Opens the page of redag serve in Chromium, with executors that run. What they do must be shown, no error may be
+// logged, nothing may be requested elsewhere, nothing may be wider than a phone, and hostile names must stay text.
+// Leaves screenshots for inspection.
+import assert from 'node:assert/strict';
+import {spawn} from 'node:child_process';
+import fs from 'node:fs';
+import path from 'node:path';
+import {createInterface} from 'node:readline';
+import {chromium} from 'playwright-core';
+
+const [executable, redag, source, scratch] = process.argv.slice(2);
+const shot = (name) => path.join(scratch, 'screenshots', `${name}.png`);
+// A folder of its own, because other executors may run on this machine. Links to pages cannot leave /dev/shm.
+const folder = fs.mkdtempSync('/dev/shm/redag-live-');
+const children = [];
+
+/** Starts an executor and links its page into the folder. */
+async function start(workload) {
+  const child = spawn(redag, ['run', workload, '--preemption', 'none', '--duration', '1h', '--json'], {stdio: 'ignore'});
+  children.push(child);
+  const page = `redag.${child.pid}.0`;
+  while (!fs.existsSync(path.join('/dev/shm', page))) await new Promise((done) => { setTimeout(done, 20); });
+  fs.linkSync(path.join('/dev/shm', page), path.join(folder, page));
+  return {pid: child.pid, kill: () => new Promise((done) => { child.on('exit', done); child.kill('SIGKILL'); })};
+}
+
+const server = spawn(redag, ['serve', '--port', '0', '--interval', '500ms', '--folder', folder], {stdio: ['ignore', 'pipe', 'inherit']});
+children.push(server);
+const [address] = await new Promise((done) => { createInterface(server.stdout).once('line', (line) => done([line])); });
+const origin = new URL(address).origin;
+
+const browser = await chromium.launch({executablePath: executable, args: ['--no-sandbox', '--disable-gpu']});
+let failures = 0;
+async function test(name, body) {
+  try {
+    await body();
+    console.log(`ok       ${name}`);
+  } catch (error) {
+    failures += 1;
+    console.log(`FAILED   ${name}: ${error.message}`);
+  }
+}
+
+/** Opens the page; `problems` collects what must not happen. */
+async function open(options = {}) {
+  const context = await browser.newContext({viewport: {width: 1280, height: 900}, colorScheme: 'light', ...options});
+  context.setDefaultTimeout(120000);  // a busy machine
+  const page = await context.newPage();
+  const problems = [];
+  page.on('console', (message) => { if (['error', 'warning'].includes(message.type())) problems.push(message.text()); });
+  page.on('pageerror', (error) => problems.push(String(error)));
+  page.on('request', (request) => { if (!/^(data|blob):/.test(request.url()) && new URL(request.url()).origin !== origin) problems.push(`request: ${request.url()}`); });
+  await page.goto(address);
+  await page.waitForSelector('html[data-ready=true]');
+  return {page, problems, close: () => context.close()};
+}
+const none = (problems) => assert.deepEqual(problems, []);
+const names = (page) => page.locator('.live-table tbody th').allInnerTexts();
+
+await test('without a token there is no page', async () => {
+  const context = await browser.newContext();
+  const page = await context.newPage();
+  assert.equal((await page.goto(`${origin}/`)).status(), 403);
+  assert.equal((await page.goto(`${origin}/?token=${'0'.repeat(64)}`)).status(), 403);
+  assert.doesNotMatch(await page.content(), /<main/);
+  await context.close();
+});
+
+await test('without an executor the page waits for one', async () => {
+  const {page, problems, close} = await open();
+  assert.match(await page.locator('.facts').innerText(), /waits for one/);
+  none(problems);
+  await close();
+});
+
+const robot = await start(path.join(source, 'workloads', 'robot.yaml'));
+await test('an executor is shown, and the token leaves the address', async () => {
+  const {page, problems, close} = await open();
+  assert.equal(page.url(), `${origin}/`);
+  await page.waitForFunction(() => document.querySelectorAll('.live-table tbody tr').length > 5);
+  assert.equal(await page.locator('h1').innerText(), 'robot');
+  assert.match(await page.locator('.facts').innerText(), new RegExp(`redag ${robot.pid}`));
+  assert.equal(await page.locator('.state').innerText(), 'running');
+  // Figures change, and the rows stay the same elements.
+  await page.evaluate(() => { window.firstRow = document.querySelector('.live-table tbody tr'); });
+  const before = await page.locator('#headline').innerText();
+  await page.waitForFunction((old) => document.querySelector('#headline').innerText !== old, before);
+  assert.ok(await page.evaluate(() => window.firstRow === document.querySelector('.live-table tbody tr')));
+  await page.waitForFunction(() => document.querySelectorAll('.spread rect').length > 10 && document.querySelectorAll('.worker').length > 0
+    && document.querySelectorAll('figure[data-figure=course] svg path').length > 5);
+  await page.waitForTimeout(6000);
+  await page.screenshot({path: shot('live'), fullPage: true});
+  none(problems);
+  await close();
+});
+
+await test('dark: the page follows the system, and the reader', async () => {
+  const {page, problems, close} = await open({colorScheme: 'dark'});
+  const background = () => page.evaluate(() => getComputedStyle(document.body).backgroundColor);
+  const dark = await background();
+  await page.waitForTimeout(2500);
+  await page.screenshot({path: shot('live-dark'), fullPage: true});
+  await page.getByRole('button', {name: 'light', exact: true}).click();
+  assert.notEqual(await background(), dark);
+  none(problems);
+  await close();
+});
+
+await test('phone: nothing is wider than the screen', async () => {
+  const {page, problems, close} = await open({viewport: {width: 390, height: 844}, isMobile: true, hasTouch: true, deviceScaleFactor: 2});
+  await page.waitForTimeout(2500);
+  const width = await page.evaluate(() => document.documentElement.scrollWidth);
+  assert.ok(width <= 390, `the page is ${width} wide`);
+  await page.screenshot({path: shot('live-phone'), fullPage: true});
+  none(problems);
+  await close();
+});
+
+await test('controls: filter, order, DAGs only, since the start', async () => {
+  const {page, problems, close} = await open();
+  await page.waitForFunction(() => document.querySelectorAll('.live-table tbody tr').length > 5);
+  const all = await names(page);
+  await page.getByRole('searchbox').fill('CONTROLLER');
+  assert.deepEqual((await names(page)).map((name) => name.toLowerCase()).filter((name) => name.includes('controller')).length, 1);
+  assert.ok((await names(page)).length < all.length);
+  await page.getByRole('searchbox').fill('no such name');
+  assert.deepEqual(await names(page), []);
+  await page.getByRole('searchbox').fill('');
+  await page.getByRole('button', {name: 'p99', exact: true}).click();
+  assert.equal(await page.locator('th[aria-sort]').innerText(), 'p99');
+  assert.ok((await names(page)).every((name) => name.includes('.')), 'tasks only, with the names of their DAGs');
+  await page.getByRole('button', {name: 'only DAGs'}).click();
+  assert.ok((await names(page)).every((name) => !name.includes('.')));
+  await page.getByRole('button', {name: 'only DAGs'}).click();
+  await page.getByRole('button', {name: 'DAG and task'}).click();
+  assert.deepEqual(await names(page), all);
+  await page.getByRole('button', {name: 'since the start'}).click();
+  assert.equal(await page.getByRole('button', {name: 'since the start'}).getAttribute('aria-pressed'), 'true');
+  none(problems);
+  await close();
+});
+
+const hostile = await start(path.join(source, 'tests', 'report', 'hostile.yaml'));
+await test('several: one is chosen; names are text; one that is killed is said to have ended', async () => {
+  const {page, problems, close} = await open();
+  const picker = page.getByLabel('executor', {exact: true});
+  await page.waitForFunction(() => document.querySelectorAll('select option').length === 2);
+  await picker.selectOption(String(hostile.pid));
+  await page.waitForFunction((pid) => document.querySelector('.facts').innerText.includes(`redag ${pid}`), hostile.pid);
+  await page.waitForFunction(() => document.querySelectorAll('.live-table tbody tr').length > 0);
+  assert.equal(await page.locator('main img, main script, main iframe').count(), 0);
+  await page.screenshot({path: shot('live-hostile'), fullPage: true});
+  await hostile.kill();
+  await page.waitForFunction(() => document.querySelector('.state').innerText === 'ended');
+  assert.ok((await names(page)).length > 0, 'the last picture stays');
+  await page.screenshot({path: shot('live-ended'), fullPage: true});
+  await picker.selectOption(String(robot.pid));
+  await page.waitForFunction(() => document.querySelector('h1').innerText === 'robot' && document.querySelector('.state').innerText === 'running');
+  none(problems);
+  await close();
+});
+
+await test('the end of redag serve is said', async () => {
+  const {page, close} = await open();
+  server.kill('SIGINT');
+  const status = await new Promise((done) => { server.on('exit', done); });
+  assert.equal(status, 0);
+  await page.waitForFunction(() => document.querySelector('.state').innerText === 'no connection');
+  await close();
+});
+
+for (const child of children) child.kill('SIGKILL');
+fs.rmSync(folder, {recursive: true});
+await browser.close();
+process.exit(failures > 0 ? 1 : 0);

@@ -1,0 +1,243 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// Reads report pages as people do who use a keyboard, a screen reader, a phone or paper: the rules of axe-core, the
+// order of focus, sorting, contents, tables that hold what the figures show, widths, and what is printed.
+import assert from 'node:assert/strict';
+import fs from 'node:fs';
+import path from 'node:path';
+import {FIGURES, PHONE, browserOf} from './pages.mjs';
+
+const {open, test, none, shot, scratch, end} = await browserOf(process.argv.slice(2));
+const axe = fs.readFileSync(path.join(scratch, 'node_modules', 'axe-core', 'axe.min.js'), 'utf8');
+const WIDTHS = {phone: PHONE, tablet: {viewport: {width: 768, height: 1024}}, desktop: {}};
+
+const linear = (hex) => [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16) / 255).map((c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4));
+const luminance = ([r, g, b]) => 0.2126 * r + 0.7152 * g + 0.0722 * b;
+/** The contrast of WCAG 2. */
+function contrast(a, b) {
+  const [low, high] = [a, b].map((hex) => luminance(linear(hex))).sort((x, y) => x - y);
+  return (high + 0.05) / (low + 0.05);
+}
+// What people with deuteranopia and protanopia see (Machado, Oliveira and Fernandes, 2009), and everybody else.
+const EYES = [
+  [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+  [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.01182, 0.04294, 0.968881]],
+  [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
+];
+function lab([r, g, b]) {
+  const part = (value) => (value > 0.008856 ? Math.cbrt(value) : 7.787 * value + 16 / 116);
+  const [x, y, z] = [(0.4124 * r + 0.3576 * g + 0.1805 * b) / 0.9505, luminance([r, g, b]), (0.0193 * r + 0.1192 * g + 0.9505 * b) / 1.089].map(part);
+  return [116 * y - 16, 500 * (x - y), 200 * (y - z)];
+}
+/** The least distance of two colours in CIELAB, over all kinds of eyes. */
+const difference = (a, b) => Math.min(...EYES.map((eye) => {
+  const [p, q] = [a, b].map((hex) => lab(eye.map((row) => Math.min(1, Math.max(0, row.reduce((sum, k, i) => sum + k * linear(hex)[i], 0))))));
+  return Math.hypot(...p.map((value, i) => value - q[i]));
+}));
+
+/** What axe-core finds, as "rule: element". */
+async function violations(page) {
+  await page.evaluate(axe);
+  const found = await page.evaluate(() => window.axe.run(document, {resultTypes: ['violations']}));
+  return found.violations.flatMap(({id, nodes}) => nodes.slice(0, 4).map((node) => `${id}: ${node.html.slice(0, 140)}: ${node.failureSummary.split('\n')[1] || ''}`));
+}
+
+for (const name of ['comparison', 'single', 'hostile', 'experiment', 'worlds']) {
+  await test(`${name}: axe-core finds nothing, in light and dark, on desktop and phone`, async () => {
+    for (const options of [{}, {colorScheme: 'dark'}, PHONE]) {
+      const {page, close} = await open(name, options);
+      await page.evaluate(() => document.querySelectorAll('details').forEach((node) => { node.open = true; }));
+      await page.waitForFunction(() => [...document.querySelectorAll('details.data')].every((node) => node.querySelector('tbody tr')));
+      assert.deepEqual(await violations(page), [], JSON.stringify(options.colorScheme || options.viewport || 'light'));
+      await close();
+    }
+  });
+}
+
+await test('colours: text has a contrast of 4.5:1, shapes of 3:1, and hues differ for the colour-blind', async () => {
+  for (const colorScheme of ['light', 'dark']) {
+    const {page, close} = await open('comparison', {colorScheme});
+    const {tokens, hues, shades} = await page.evaluate(() => {
+      const style = getComputedStyle(document.documentElement);
+      const names = ['paper', 'raised', 'ink', 'soft', 'missed', 'met', 'delay', 'missed-back', 'met-back'];
+      const looks = (words) => [...[...document.querySelectorAll('ul.key li')].find((node) => node.textContent.startsWith(words)).dataset.looks.split(' ')];
+      return {tokens: Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()])), hues: looks('hue'), shades: looks('shade')};
+    });
+    const text = [['ink', 'paper'], ['ink', 'raised'], ['soft', 'paper'], ['soft', 'raised'], ['missed', 'paper'], ['missed', 'raised'], ['missed', 'missed-back'],
+      ['met', 'paper'], ['met', 'met-back'], ['delay', 'paper'], ['delay', 'raised'], ['ink', 'missed-back'], ['ink', 'met-back']];
+    assert.deepEqual(text.filter(([a, b]) => contrast(tokens[a], tokens[b]) < 4.5), [], colorScheme);
+    assert.ok(hues.length === 8 && shades.length === 3);
+    for (const look of [...hues, ...shades]) assert.ok(contrast(look, tokens.paper) >= 3, `${look} on ${tokens.paper}`);
+    assert.ok(difference(tokens.missed, tokens.met) > 14);
+    const meanings = ['missed', 'met', 'delay'].map((name) => tokens[name]);
+    for (const [i, hue] of hues.entries()) {
+      for (const other of hues.slice(i + 1)) assert.ok(difference(hue, other) > 14, `${hue} and ${other}: ${difference(hue, other)}`);
+      for (const other of meanings) assert.ok(difference(hue, other) > 10, `${hue} means something else than ${other}: ${difference(hue, other)}`);
+    }
+    await close();
+  }
+});
+
+await test('headline: the verdict is the first heading, and says whether deadlines were met', async () => {
+  for (const [name, pattern] of [['comparison', /redag/], ['single', /deadline/], ['experiment', /on average: from/]]) {
+    const {page, close} = await open(name);
+    assert.match(await page.locator('main h2').first().innerText(), pattern);
+    assert.equal(await page.locator('main h2').first().getAttribute('id'), 'verdict');
+    await close();
+  }
+});
+
+await test('keyboard: the first stop skips to the report, and the contents lead to a section and follow it', async () => {
+  const {page, problems, close} = await open('comparison');
+  await page.keyboard.press('Tab');
+  assert.equal(await page.evaluate(() => document.activeElement.textContent), 'Skip to the report');
+  await page.keyboard.press('Enter');
+  assert.equal(await page.evaluate(() => document.activeElement.id), 'report');
+  const links = page.locator('nav.contents a');
+  assert.ok(await links.count() >= 8);
+  for (const target of ['schedule', 'tasks', 'why']) {
+    const link = page.locator(`nav.contents a[href="#${target}"]`);
+    await link.focus();
+    await page.keyboard.press('Enter');
+    await page.waitForFunction((id) => {
+      const current = [...document.querySelectorAll('nav.contents a[aria-current]')];
+      return current.length === 1 && current[0].getAttribute('href') === `#${id}`;
+    }, target, {timeout: 5000});
+    const {top} = await page.locator(`#${target}`).evaluate((node) => node.getBoundingClientRect());
+    assert.ok(top >= 0 && top < 200, `${target} is at ${top}`);
+    assert.ok(await link.isVisible(), 'the contents stay in view');
+  }
+  none(problems);
+  await close();
+});
+
+await test('sorting: by click and by key, both ways, and kept when the table is made again', async () => {
+  const {page, problems, close} = await open('comparison');
+  const box = page.locator('[data-table=Tasks]');
+  const names = () => box.locator('tbody th').allInnerTexts();
+  const asListed = await names();
+  const head = (title) => box.locator('thead th', {hasText: title});
+  await head('max lateness').getByRole('button').click();
+  assert.equal(await head('max lateness').getAttribute('aria-sort'), 'descending');
+  const down = await names();
+  assert.notDeepEqual(down, asListed);
+  await head('max lateness').getByRole('button').focus();
+  await page.keyboard.press('Enter');
+  assert.equal(await head('max lateness').getAttribute('aria-sort'), 'ascending');
+  assert.deepEqual(await names(), [...down].reverse());
+  await head('task').getByRole('button').press('Space');
+  assert.deepEqual(await names(), [...asListed].sort());
+  assert.equal(await head('max lateness').getAttribute('aria-sort'), 'none');
+  await page.getByRole('button', {name: 'dark', exact: true}).click();
+  assert.equal(await head('task').getAttribute('aria-sort'), 'ascending', 'a new theme keeps the order');
+  none(problems);
+  await close();
+});
+
+await test('the worst jobs: all misses are listed or counted, and a key explains one', async () => {
+  const {page, problems, close} = await open('comparison');
+  const document = JSON.parse(await page.locator('#data').textContent());
+  const group = document.groups.findIndex(({label}) => label === 'ste');
+  await page.getByRole('button', {name: 'ste', exact: true}).click();
+  const {worst, misses} = document.groups[group].why;
+  assert.ok(misses > 12, 'there is something to fold');
+  assert.equal(worst.task.length, Math.min(misses, 1000));
+  const box = page.locator('[data-table="The worst jobs"]');
+  const shown = await box.locator('tbody tr').count();
+  const left = Number((await box.locator('p.row').innerText()).replace(/^.*; (.*) more.*$/s, '$1').replace(/\D/g, ''));
+  assert.equal(shown + left, misses);
+  await box.getByRole('button', {name: /^show/}).click();
+  assert.equal(await box.locator('tbody tr').count(), worst.task.length);
+  const third = box.locator('tbody tr').nth(2);
+  const name = await third.locator('th').innerText();
+  await third.getByRole('button').focus();
+  await page.keyboard.press('Enter');
+  assert.equal(await page.evaluate(() => document.activeElement.textContent), name, 'the focus stays');
+  assert.ok((await page.locator('p.job').innerText()).startsWith(name));
+  assert.equal(await box.locator('tr[aria-current=true] th').innerText(), name);
+  none(problems);
+  await close();
+});
+
+await test('every figure has its data as a table', async () => {
+  for (const name of ['comparison', 'experiment', 'worlds']) {
+    const {page, problems, close} = await open(name);
+    for (const figure of FIGURES[name]) {
+      const data = page.locator(`figure[data-figure=${figure}] details.data`);
+      await data.locator('summary').click();
+      await data.locator('tbody tr').first().waitFor();
+      assert.equal(await data.locator('thead th[scope=col]').count(), await data.locator('tbody tr').first().locator('th, td').count(), figure);
+    }
+    none(problems);
+    await close();
+  }
+});
+
+await test('the wheel scrolls the page over every figure, and zooms only with Ctrl', async () => {
+  const {page, problems, close} = await open('comparison');
+  for (const name of FIGURES.comparison) {
+    const figure = page.locator(`figure[data-figure=${name}] .chart`);
+    await figure.evaluate((node) => window.scrollTo(0, node.getBoundingClientRect().top + window.scrollY - 200));
+    await figure.hover({position: {x: 300, y: 120}});
+    const before = await page.evaluate(() => window.scrollY);
+    await page.mouse.wheel(0, 160);
+    await page.waitForFunction((old) => window.scrollY !== old, before, {timeout: 5000});
+  }
+  const figure = page.locator('figure[data-figure=timeline] .chart');
+  const drawn = () => figure.locator('svg').first().innerHTML();
+  await figure.hover({position: {x: 300, y: 100}});
+  const whole = await drawn();
+  await page.keyboard.down('Control');
+  await page.mouse.wheel(0, -160);
+  await page.keyboard.up('Control');
+  await page.waitForFunction(([node, old]) => node.innerHTML !== old, [await figure.locator('svg').first().elementHandle(), whole], {timeout: 5000});
+  const before = await drawn();
+  await page.getByRole('button', {name: 'timeline: zoom in', exact: true}).click();
+  const closer = await drawn();
+  assert.notEqual(closer, before);
+  await page.getByRole('button', {name: 'timeline: later', exact: true}).click();
+  assert.notEqual(await drawn(), closer);
+  none(problems);
+  await close();
+});
+
+await test('widths: at 390, 768 and 1280 pixels the page does not scroll sideways; on a phone no table does', async () => {
+  for (const name of Object.keys(FIGURES)) {
+    for (const [width, options] of Object.entries(WIDTHS)) {
+      const {page, problems, close} = await open(name, options);
+      const wide = await page.evaluate(() => document.documentElement.scrollWidth - window.innerWidth);
+      assert.ok(wide <= 0, `${name}: ${width}: ${wide} too wide`);
+      if (width === 'phone') {
+        const cut = await page.evaluate(() => [...document.querySelectorAll('.table')].filter((node) => node.scrollWidth > node.clientWidth + 1)
+          .map((node) => node.getAttribute('aria-label')));
+        assert.deepEqual(cut, [], name);
+      }
+      if (['comparison', 'single', 'experiment'].includes(name)) await page.screenshot({path: shot(`${name}-${width}`), fullPage: true});
+      none(problems);
+      await close();
+    }
+  }
+});
+
+await test('paper: every row up to a limit, no buttons, whole legends, and a plausible number of pages', async () => {
+  for (const [name, most] of [['comparison', 9], ['single', 8], ['wide', 24], ['experiment', 9]]) {
+    const {page, problems, close} = await open(name, {colorScheme: 'dark'});
+    const pdf = await page.pdf({path: path.join(scratch, 'screenshots', `${name}.pdf`), format: 'A4', preferCSSPageSize: true});
+    const pages = pdf.toString('latin1').match(/\/Type\s*\/Page\b/g).length;
+    assert.ok(pages >= 2 && pages <= most, `${name} has ${pages} pages`);
+    console.log(`         ${name}: ${pages} pages`);
+    none(problems);
+    await close();
+  }
+  const {page, close} = await open('wide');
+  const rows = page.locator('[data-table=Tasks] tbody tr');
+  assert.equal(await rows.count(), 40);
+  await page.evaluate(() => window.dispatchEvent(new Event('beforeprint')));
+  assert.equal(await rows.count(), 360, 'all tasks');
+  await page.evaluate(() => window.dispatchEvent(new Event('afterprint')));
+  assert.equal(await rows.count(), 40);
+  await close();
+});
+
+await end();
