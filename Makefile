@@ -4,7 +4,7 @@
 # The front door: each target does one everyday thing from a fresh clone on. What it runs is plain CMake and the scripts
 # of tools/; nothing is built here that `cmake --preset` could not build.
 .DEFAULT_GOAL := help
-.PHONY: help demo test seeds bench instructions lint format asan tsan coverage mutate fuzz chaos ros install clean
+.PHONY: help demo test seeds bench instructions lint format asan tsan coverage mutate fuzz chaos ros reference install deb site clean
 PREFIX ?= /usr/local
 
 # ThreadSanitizer of older compilers cannot start where a kernel randomises much of the address space
@@ -113,12 +113,30 @@ ros: ## build the ROS packages with colcon and run their tests, for each ROS 2 u
 	@tools/bootstrap test
 	tools/test_rclcpp
 
+reference: ## the reference of the C++ interface, by doxygen, in build/reference/html; its warnings are errors
+	@tools/bootstrap reference
+	tools/reference
+
 install: ## install libraries, headers and program to PREFIX (default /usr/local)
 	@tools/bootstrap run
 	cmake --preset release
 	cmake --build --preset release
 	cmake --install build/release --prefix $(PREFIX)
 
+PRERELEASE ?=
+deb: ## Debian packages in build/package/packages; PRERELEASE=rc1 makes those of a release candidate
+	@tools/bootstrap package
+	rm -rf build/package/packages
+	cmake --preset package -DREDAG_PRERELEASE=$(PRERELEASE)
+	export SOURCE_DATE_EPOCH=$$(git log -1 --format=%ct) && cmake --build --preset package && \
+	  cpack --config build/package/CPackConfig.cmake
+
+site: ## the documentation site in results/site
+	@tools/bootstrap site
+	cmake --preset release
+	cmake --build --preset release
+	tools/build_site build/release/bin/redag results/site
+
 clean: ## remove what the targets above built; results/ stays
-	rm -rf build/dev build/test build/release build/bench build/asan-ubsan build/tsan build/coverage build/mutate build/fuzz build/colcon
+	rm -rf build/dev build/test build/release build/bench build/asan-ubsan build/tsan build/coverage build/mutate build/fuzz build/package build/colcon build/reference
 	git worktree prune

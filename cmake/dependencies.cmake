@@ -5,17 +5,26 @@
 # visible only in its folder and below. A package that is built alone finds what it needs in its own CMakeLists.txt.
 # tools/bootstrap installs the packages.
 find_package(CLI11 REQUIRED)
+set(CURSES_NEED_WIDE TRUE)
+find_package(Curses REQUIRED)
 find_package(fmt REQUIRED)
 find_package(LibYAML REQUIRED)
 find_package(nlohmann_json REQUIRED)
+find_package(PkgConfig REQUIRED)
 find_package(SQLite3 REQUIRED)
 find_package(TBB REQUIRED)
 find_package(Threads REQUIRED)
 find_package(tl-expected REQUIRED)
 find_package(ZLIB REQUIRED)
+# For an option of redag_lab/.
+if(REDAG_PROMETHEUS)
+  find_package(prometheus-cpp REQUIRED)
+endif()
 
 if(REDAG_BUILD_TESTS)
+  list(APPEND CMAKE_MODULE_PATH ${CMAKE_CURRENT_LIST_DIR})
   find_package(GTest REQUIRED)
+  find_package(Protozero REQUIRED)
   find_package(rapidcheck REQUIRED)
   find_package(Python3 REQUIRED COMPONENTS Interpreter)
   include(GoogleTest)

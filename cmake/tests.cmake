@@ -26,7 +26,7 @@ redag_sources(testing_sources redag_testing)
 add_library(redag_testing STATIC ${testing_sources})
 # Everything that tests may use: a test program names no further libraries.
 target_link_libraries(redag_testing
-  PUBLIC redag_lab fmt::fmt LibYAML::LibYAML nlohmann_json::nlohmann_json GTest::gtest GTest::gmock rapidcheck
+  PUBLIC redag_lab fmt::fmt LibYAML::LibYAML nlohmann_json::nlohmann_json Protozero::Protozero GTest::gtest GTest::gmock rapidcheck
   PRIVATE redag_warnings)
 # Only this source depends on where the sources lie: ccache finds the others again for another checkout.
 set_source_files_properties(redag_testing/repository.cpp PROPERTIES

@@ -26,6 +26,7 @@ set(alone
   redag_analysis/many_workers/global_sequential_test.cpp
   redag_analysis/metrics/deadline_watch_test.cpp
   redag_analysis/metrics/jobs_test.cpp
+  redag_analysis/metrics/perfetto_test.cpp
   redag_analysis/metrics/summary_test.cpp
   redag_analysis/metrics/trace_checker_test.cpp
   redag_analysis/one_worker/edf_demand.cpp
@@ -53,6 +54,9 @@ set(alone
   redag_lab/cli/run/recover_command.cpp
   redag_lab/cli/run/run_report.cpp
   redag_lab/cli/run/validate_command.cpp
+  redag_lab/cli/serve/live_server.cpp
+  redag_lab/cli/serve/serve_command.cpp
+  redag_lab/cli/terminal/screen.cpp
   redag_lab/cli/top/top_command.cpp
   redag_lab/experiment/factorial_plan.cpp
   redag_lab/experiment/factorial_plan_test.cpp

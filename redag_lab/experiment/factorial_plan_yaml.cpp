@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "redag/base/lines.hpp"
 #include "redag/model/clusters.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/model/workload_yaml.hpp"
@@ -194,10 +195,8 @@ class Reader : private PlanReader {
 std::string block(std::string_view text, std::string_view indentation) {
   std::string indented;
   while (!text.empty()) {
-    const std::size_t end = text.find('\n');
-    const std::string_view line = text.substr(0, end);
+    const std::string_view line = next_line(text);
     indented += fmt::format("{}{}\n", line.empty() ? "" : indentation, line);
-    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
   }
   return indented;
 }

@@ -23,6 +23,7 @@
 
 #include <fmt/format.h>
 
+#include "redag/base/lines.hpp"
 #include "redag_lab/experiment/unit_dispenser.hpp"
 
 namespace redag::experiment {
@@ -100,8 +101,7 @@ class Worker {
 
 Result<void> accept_lines(std::string_view lines, UnitDispenser &dispenser) {
   while (!lines.empty()) {
-    const std::string_view line = lines.substr(0, lines.find('\n'));
-    lines.remove_prefix(line.size() + 1);
+    const std::string_view line = next_line(lines);
     std::uint64_t unit = 0;
     const auto parsed = std::from_chars(line.data(), line.data() + line.size(), unit);
     const auto digits = static_cast<std::size_t>(parsed.ptr - line.data());

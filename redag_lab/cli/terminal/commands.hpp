@@ -32,9 +32,14 @@ Action add_assign(CLI::App &app);
 Action add_tune(CLI::App &app);
 Action add_experiment(CLI::App &app);
 Action add_check_trace(CLI::App &app);
+Action add_events(CLI::App &app);
 Action add_recover(CLI::App &app);
 Action add_report(CLI::App &app);
 Action add_top(CLI::App &app);
+Action add_serve(CLI::App &app);
 Action add_why(CLI::App &app);
+Action add_export(CLI::App &app);
+Action add_completion(CLI::App &app);
+Action add_man(CLI::App &app);
 
 }  // namespace redag::cli

@@ -9,24 +9,38 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <charconv>
 #include <cstdlib>
 #include <cstring>
 
 #include "redag/base/text.hpp"
 #include "redag_analysis/text/tint.hpp"
+#include "redag_analysis/text/wrap.hpp"
 
 namespace redag::cli {
 namespace {
 
 constexpr std::size_t kBufferSize = std::size_t{1} << 20U;
 
+// The value of COLUMNS, as POSIX defines it: a positive number, or else it counts as unset.
+std::size_t columns_asked_for() {
+  const char *columns = std::getenv("COLUMNS");
+  if (columns == nullptr) return 0;
+  const std::string_view text = columns;
+  std::uint16_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  return error == std::errc() && end == text.data() + text.size() ? number : 0;
+}
+
 StreamTraits traits_of(int descriptor) {
   StreamTraits traits;
   traits.terminal = isatty(descriptor) == 1;
+  traits.width = columns_asked_for();
   if (!traits.terminal) return traits;
   const char *no_color = std::getenv("NO_COLOR");  // https://no-color.org: set and not empty
   const char *term = std::getenv("TERM");
   traits.colour = (no_color == nullptr || *no_color == '\0') && term != nullptr && std::strcmp(term, "dumb") != 0;
+  if (traits.width > 0) return traits;
   winsize size{};
   traits.width = ioctl(descriptor, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
   return traits;
@@ -76,6 +90,8 @@ Console::Console(int out, StreamTraits out_traits, int err, StreamTraits err_tra
     : out_(out), err_(err), out_traits_(out_traits), err_traits_(err_traits) {}
 
 Console::Console() : Console(STDOUT_FILENO, traits_of(STDOUT_FILENO), STDERR_FILENO, traits_of(STDERR_FILENO)) {}
+
+void Console::say(std::string_view text) { print(fitted(text, out_traits_.width)); }
 
 void Console::print(std::string_view text) {
   if (out_traits_.terminal) {

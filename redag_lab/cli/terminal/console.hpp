@@ -17,7 +17,7 @@ namespace redag::cli {
 struct StreamTraits {
   bool terminal = false;
   bool colour = false;    // a terminal, unless NO_COLOR or TERM=dumb is set
-  std::size_t width = 0;  // columns; 0: no limit
+  std::size_t width = 0;  // columns: COLUMNS, or else those of the terminal; 0: no limit
 };
 
 class Console {
@@ -30,8 +30,10 @@ class Console {
   [[nodiscard]] const StreamTraits &out_traits() const { return out_traits_; }
   [[nodiscard]] const StreamTraits &err_traits() const { return err_traits_; }
 
-  /// Prints results.
+  /// Prints results as they are: documents for programs.
   void print(std::string_view text);
+  /// Prints results for people: breaks lines that are wider than the terminal at words.
+  void say(std::string_view text);
   /// Prints remarks; errors in writing them are ignored.
   void note(std::string_view text);
   void note(const Diagnostic &diagnostic);
@@ -39,6 +41,9 @@ class Console {
   /// Prints a warning about the run, not about a file.
   void warn(std::string_view message, std::string_view hint = {});
   void error(std::string_view message, std::string_view hint = {});
+
+  /// True if a write to standard output has failed: there is no use in printing more.
+  [[nodiscard]] bool is_broken() const { return error_ != 0; }
 
   /// Writes the printed text. A reader that left early (`| head`) is no error. Returns false, after a note, if the text
   /// could not be written.

@@ -15,6 +15,8 @@
 #include <memory>
 #include <system_error>
 
+#include "redag/base/text.hpp"
+#include "redag/trace/events_file.hpp"
 #include "redag/trace/output_file.hpp"
 #include "redag_lab/run/variant.hpp"
 
@@ -96,19 +98,31 @@ Result<std::vector<std::string>> find_traces(const std::string &place) {
   std::vector<std::string> files;
   fs::recursive_directory_iterator entry(place, error);
   for (const fs::recursive_directory_iterator end; !error && entry != end; entry.increment(error)) {
-    if (entry->path().filename() == "events.jsonl") files.push_back(entry->path().string());
+    if (entry->path().filename() == trace::kEventsFile) files.push_back(entry->path().string());
+    if (entry->path().filename() != trace::kEventsTextFile) continue;
+    // Beside the other form it is that of an earlier run.
+    std::error_code ignored;
+    if (!fs::exists(entry->path().parent_path() / trace::kEventsFile, ignored)) files.push_back(entry->path().string());
   }
   if (error) return trace::file_error(place, 0, fmt::format("cannot list the folder: {}", error.message()));
   if (files.empty() && fs::exists(flight_folder(place), error)) {
-    return trace::file_error(place, 0, "this folder holds no events.jsonl, only the record of a run that did not end",
+    return trace::file_error(place, 0, "this folder holds no events.redag, only the record of a run that did not end",
                              fmt::format("'redag recover {}' restores its results", place));
   }
   if (files.empty()) {
-    return trace::file_error(place, 0, "no events.jsonl in this folder or below it",
+    return trace::file_error(place, 0, "no events.redag or events.jsonl in this folder or below it",
                              "'redag run', 'simulate' and 'compare' write one with '--out DIR'");
   }
   std::sort(files.begin(), files.end());
   return files;
+}
+
+Result<std::string> find_trace(const std::string &place) {
+  Result<std::vector<std::string>> files = find_traces(place);
+  if (!files) return tl::unexpected<Diagnostics>(std::move(files.error()));
+  if (files->size() == 1) return files->front();
+  return make_error(fmt::format("{} holds {} runs", in_quotes(place), files->size()),
+                    fmt::format("name one of them, such as {}", in_quotes(files->front())));
 }
 
 std::string flight_folder(const std::string &folder) { return folder + "/" + kFlightName; }
@@ -119,9 +133,11 @@ bool is_result_name(std::string_view name) {
   if (const std::size_t at = name.rfind(".tmp."); at != std::string_view::npos && is_number(name.substr(at + 5))) {
     name = name.substr(0, at);
   }
-  constexpr std::array<std::string_view, 32> kNames = {"jobs.csv",
+  constexpr std::array<std::string_view, 34> kNames = {"jobs.csv",
                                                        "summary.json",
-                                                       "trace.json",
+                                                       "trace.pftrace",
+                                                       "trace.json",  // of earlier versions
+                                                       "events.redag",
                                                        "events.jsonl",
                                                        "workload.yaml",
                                                        "comparison.json",

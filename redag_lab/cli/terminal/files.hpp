@@ -30,9 +30,12 @@ namespace redag::cli {
 /// Returns the place in a result folder where `redag run` records a run while it runs (trace/flight_recorder.hpp).
 [[nodiscard]] std::string flight_folder(const std::string &folder);
 
-/// Returns the traces at a place, sorted: the file itself, or every events.jsonl in the folder and below. Error: none
-/// found.
+/// Returns the traces at a place, sorted: the file itself, or every events.redag and events.jsonl in the folder and
+/// below. Error: none found.
 [[nodiscard]] Result<std::vector<std::string>> find_traces(const std::string &place);
+
+/// The same for a place that must hold one trace.
+[[nodiscard]] Result<std::string> find_trace(const std::string &place);
 
 /// True if a command writes a file or folder of this name into a result folder.
 [[nodiscard]] bool is_result_name(std::string_view name);

@@ -53,17 +53,7 @@ std::string remarks_on(const CLI::Option &option) {
   return remarks.empty() ? std::string() : fmt::format(" ({})", fmt::join(remarks, "; "));
 }
 
-std::string row(const CLI::Option &option) {
-  std::string name = names_of(option);
-  const std::string type = option.get_type_name();
-  const bool is_optional_value = type.rfind("[=", 0) == 0;
-  if (is_optional_value) {
-    name += type;
-  } else if (!option.get_positional() && option.get_type_size() != 0 && !type.empty()) {
-    name += " " + type;
-  }
-  return row(name, option.get_description() + remarks_on(option));
-}
+std::string row(const CLI::Option &option) { return row(label_of(option), description_of(option)); }
 
 std::string section(const std::string &title, const std::vector<const CLI::Option *> &options) {
   std::string text;
@@ -72,6 +62,27 @@ std::string section(const std::string &title, const std::vector<const CLI::Optio
 }
 
 }  // namespace
+
+std::string type_name(const ValueType &type) {
+  return type.choices.empty() ? type.name : fmt::format("{}{{{}}}", type.name, fmt::join(type.choices, ","));
+}
+
+ValueType value_type(const CLI::Option &option) {
+  const std::string type = option.get_type_name();
+  const std::size_t brace = type.find('{');
+  if (brace == std::string::npos || type.back() != '}') return {type, {}};
+  return {type.substr(0, brace), CLI::detail::split(type.substr(brace + 1, type.size() - brace - 2), ',')};
+}
+
+std::string label_of(const CLI::Option &option) {
+  const std::string name = names_of(option);
+  const std::string type = value_type(option).name;
+  if (option.get_positional() || type.empty()) return name;
+  if (type.rfind("[=", 0) == 0) return name + type;  // a flag that may have a value
+  return option.get_type_size() == 0 ? name : name + " " + type;
+}
+
+std::string description_of(const CLI::Option &option) { return option.get_description() + remarks_on(option); }
 
 std::string HelpFormatter::make_help(const CLI::App *app, std::string name, CLI::AppFormatMode /*mode*/) const {
   std::string text = wrapped(app->get_description(), 0, kWidth) + "\n" + make_usage(app, name);

@@ -83,7 +83,11 @@ constexpr std::array kCommands = {
           "  redag experiment merge --help\n"},
     Entry{"check-trace", "Check recorded traces against the rules of the model", add_check_trace,
           "  redag check-trace results/demo\n"
-          "  redag check-trace --json results/os/events.jsonl\n"},
+          "  redag check-trace --json results/os/events.redag\n"},
+    Entry{"events", "Print the events of a recorded run as text, for other tools", add_events,
+          "  redag events results/demo | head\n"
+          "  redag events results/demo --format csv -o events.csv\n"
+          "  redag events results/demo --format perfetto -o results/demo/trace.pftrace\n"},
     Entry{"recover", "Recover the results of a run that was killed", add_recover,
           "  redag recover results/os\n"
           "  redag recover results/os --out results/rescued --keep\n"},
@@ -98,8 +102,24 @@ constexpr std::array kCommands = {
     Entry{"top", "Watch a running executor: rates, response times, misses, queues", add_top,
           "  redag top\n"
           "  redag top --list\n"
-          "  redag top 1234 --interval 500ms\n"
+          "  redag top 1234 --interval 500ms --sort misses\n"
           "  redag top 1234 --once --json\n"},
+    Entry{"serve", "Show the running executors in a browser of this machine", add_serve,
+          "  redag serve\n"
+          "  redag serve --port 0 --interval 500ms\n"},
+    Entry{"export", "Serve the figures of running executors to Prometheus", add_export,
+          "  redag export --prometheus\n"
+          "  redag export --prometheus --listen 127.0.0.1:9000\n"
+          "  redag export --prometheus --once | grep misses\n"},
+    Entry{"completion", "Write what a shell needs to complete commands, options and files", add_completion,
+          "  source <(redag completion bash)\n"
+          "  redag completion zsh --output _redag\n"
+          "  redag completion fish --output redag.fish\n"},
+    Entry{"man", "Show the manual page of a command, or write all of them", add_man,
+          "  redag man simulate | man -l -\n"
+          "  redag man experiment acceptance\n"
+          "  redag man --out man1\n"
+          "  redag man --markdown > commands.md\n"},
 };
 
 std::vector<std::string> command_names() {
@@ -182,9 +202,7 @@ int parse_and_run(const std::vector<std::string> &arguments, Console &console) {
   app.set_version_flag("--version", fmt::format("redag {} (revision {})", kVersion, build_revision()));
   app.require_subcommand(0, 1);
   app.option_defaults()->disable_flag_override();
-  auto formatter = std::make_shared<HelpFormatter>();
-  formatter->label("SUBCOMMAND", "COMMAND");
-  app.formatter(formatter);
+  app.formatter(std::make_shared<HelpFormatter>());
   app.footer(
       "Run 'redag COMMAND --help' for the options of a command, with examples.\n\n"
       "Exit status: 0 success; 1 negative result, such as a missed deadline with\n"

@@ -3,163 +3,195 @@
 
 #include "redag_lab/cli/terminal/screen.hpp"
 
+#define NCURSES_NOMACROS  // its functions, not macros of common names
+#include <curses.h>
+#include <langinfo.h>
 #include <poll.h>
-#include <sys/ioctl.h>
+#include <term.h>
 #include <termios.h>
 #include <unistd.h>
+// <term.h> has macros for the capabilities of terminals.
+#undef columns
+#undef lines
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <clocale>
 #include <csignal>
-#include <cstdlib>
 #include <cstring>
+#include <string>
 #include <string_view>
+
+#include "redag/base/check.hpp"
 
 namespace redag::cli {
 namespace {
 
-constexpr std::string_view kEnter = "\033[?1049h\033[?25l\033[?7l";  // alternate screen, no cursor, no line wrap
-constexpr std::string_view kLeave = "\033[?7h\033[?25h\033[0m\033[?1049l";
 constexpr std::array kFatal{SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT, SIGHUP, SIGQUIT, SIGPIPE};
+constexpr int kEscapeDelay = 50;  // ms that the rest of a key's sequence may take
 
-// The terminal's previous state, for the handlers. Written before the handlers are installed.
+// How the terminal was, for the handlers. Written before the handlers are installed.
 termios old_terminal{};
+std::string leaving;  // what the terminal is sent
 volatile std::sig_atomic_t is_taken = 0;
-volatile std::sig_atomic_t was_resized = 0;
 std::array<struct sigaction, kFatal.size()> old_fatal{};
-struct sigaction old_resize {};
-
-bool write_all(std::string_view text) {
-  while (!text.empty()) {
-    const ssize_t written = ::write(STDOUT_FILENO, text.data(), text.size());
-    if (written < 0 && (errno == EINTR || errno == EAGAIN)) continue;
-    if (written < 0) return false;
-    text.remove_prefix(static_cast<std::size_t>(written));
-  }
-  return true;
-}
-
-// Restores the terminal. Async-signal-safe: write and tcsetattr.
-void give_back() {
-  if (is_taken == 0) return;
-  is_taken = 0;
-  (void)write_all(kLeave);
-  (void)tcsetattr(STDIN_FILENO, TCSANOW, &old_terminal);
-}
 
 // Restores the terminal and raises the signal again. SA_RESETHAND has removed this handler, and the previous action
-// follows.
+// follows. Async-signal-safe: write and tcsetattr.
 void on_fatal(int number) {
-  give_back();
+  if (is_taken != 0) {
+    is_taken = 0;
+    (void)!::write(STDOUT_FILENO, leaving.data(), leaving.size());
+    (void)tcsetattr(STDIN_FILENO, TCSANOW, &old_terminal);
+  }
   ::raise(number);
 }
 
-void on_resize(int) { was_resized = 1; }
+// The program writes UTF-8. The C library has to know, for which the "C" locale of a container is not enough.
+void expect_utf8() {
+  (void)std::setlocale(LC_CTYPE, "");
+  if (std::strcmp(::nl_langinfo(CODESET), "UTF-8") != 0) (void)std::setlocale(LC_CTYPE, "C.UTF-8");
+}
+
+/// Returns what a terminal is sent for a capability, or "" if it has none.
+std::string sequence_of(const char *capability) {
+  const char *const text = ::tigetstr(capability);
+  const auto *const absent =
+      reinterpret_cast<const char *>(std::intptr_t{-1});  // NOLINT(performance-no-int-to-ptr): as ncurses says
+  return text == nullptr || text == absent ? std::string() : std::string(text);
+}
+
+attr_t attributes_of(Tint tint, bool colour) {
+  const auto pair = [&](short number) -> attr_t {
+    return colour ? static_cast<attr_t>(COLOR_PAIR(number)) : attr_t{0};
+  };
+  switch (tint) {
+    case Tint::Plain: return A_NORMAL;
+    case Tint::Good: return pair(1);
+    case Tint::Bad: return colour ? pair(2) : A_BOLD;
+    case Tint::Caution: return pair(3);
+    case Tint::Faint: return A_DIM;
+    case Tint::Strong: return A_BOLD;
+  }
+  return A_NORMAL;
+}
+
+KeyPress mouse_press() {
+  MEVENT event{};
+  if (::getmouse(&event) != OK) return {};
+  KeyPress press;
+  if ((event.bstate & BUTTON4_PRESSED) != 0) press.key = Key::WheelUp;
+  if ((event.bstate & BUTTON5_PRESSED) != 0) press.key = Key::WheelDown;
+  if ((event.bstate & BUTTON1_PRESSED) != 0) press.key = Key::Click;
+  press.line = static_cast<std::size_t>(std::max(event.y, 0));
+  press.column = static_cast<std::size_t>(std::max(event.x, 0));
+  return press;
+}
+
+KeyPress press_of(int code) {
+  constexpr int kEscape = 27;
+  constexpr int kControlH = 8;
+  constexpr int kDelete = 127;
+  switch (code) {
+    case KEY_UP: return {Key::Up};
+    case KEY_DOWN: return {Key::Down};
+    case KEY_PPAGE: return {Key::PageUp};
+    case KEY_NPAGE: return {Key::PageDown};
+    case KEY_HOME: return {Key::Home};
+    case KEY_END: return {Key::End};
+    case KEY_ENTER:
+    case '\r':
+    case '\n': return {Key::Enter};
+    case kEscape: return {Key::Escape};
+    case KEY_BACKSPACE:
+    case kControlH:
+    case kDelete: return {Key::Backspace};
+    case KEY_F(1): return {Key::Help};
+    case KEY_RESIZE: return {Key::Resize};
+    case KEY_MOUSE: return mouse_press();
+    default: break;
+  }
+  if (code >= 0x20 && code < 0x7f) return {Key::Text, static_cast<char>(code)};
+  return {};
+}
 
 }  // namespace
 
 bool Screen::is_possible() {
-  const char *term = std::getenv("TERM");
-  return isatty(STDIN_FILENO) == 1 && isatty(STDOUT_FILENO) == 1 && term != nullptr && std::strcmp(term, "dumb") != 0;
+  if (isatty(STDIN_FILENO) != 1 || isatty(STDOUT_FILENO) != 1) return false;
+  int found = 0;
+  if (::setupterm(nullptr, STDOUT_FILENO, &found) != OK) return false;
+  const bool can_move = !sequence_of("cup").empty();
+  (void)::del_curterm(cur_term);
+  return can_move;
 }
 
-Screen::Screen() {
+Screen::Screen(bool colour) : colour_(colour) {
   (void)tcgetattr(STDIN_FILENO, &old_terminal);
+  expect_utf8();
+  (void)::set_escdelay(kEscapeDelay);
+  REDAG_CHECK(::initscr() != nullptr, "a terminal that was possible is not");
+  leaving = "\033[?1006l\033[?1000l" + sequence_of("sgr0") + sequence_of("cnorm") + sequence_of("rmcup");
   is_taken = 1;
   struct sigaction fatal {};
   fatal.sa_handler = on_fatal;
   fatal.sa_flags = static_cast<int>(SA_RESETHAND);
   sigemptyset(&fatal.sa_mask);
   for (std::size_t i = 0; i < kFatal.size(); ++i) sigaction(kFatal[i], &fatal, &old_fatal[i]);
-  struct sigaction resize {};
-  resize.sa_handler = on_resize;
-  sigemptyset(&resize.sa_mask);
-  sigaction(SIGWINCH, &resize, &old_resize);
 
-  termios raw = old_terminal;
-  raw.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
-  raw.c_cc[VMIN] = 0;
-  raw.c_cc[VTIME] = 0;
-  raw.c_cc[VSUSP] = _POSIX_VDISABLE;  // a stopped program would leave the terminal in our mode
-  (void)tcsetattr(STDIN_FILENO, TCSANOW, &raw);
-  (void)write_all(kEnter);
+  (void)::cbreak();
+  (void)::noecho();
+  (void)::nonl();
+  (void)::curs_set(0);
+  (void)::keypad(stdscr, TRUE);
+  (void)::nodelay(stdscr, TRUE);
+  (void)::mouseinterval(0);
+  (void)::mousemask(BUTTON1_PRESSED | BUTTON4_PRESSED | BUTTON5_PRESSED, nullptr);
+  colour_ = colour_ && ::has_colors() && ::start_color() == OK;
+  if (colour_) {
+    const short background = ::use_default_colors() == OK ? short{-1} : short{COLOR_BLACK};
+    (void)::init_pair(1, COLOR_GREEN, background);
+    (void)::init_pair(2, COLOR_RED, background);
+    (void)::init_pair(3, COLOR_YELLOW, background);
+  }
 }
 
 Screen::~Screen() {
-  give_back();
+  is_taken = 0;
+  (void)::endwin();
   for (std::size_t i = 0; i < kFatal.size(); ++i) sigaction(kFatal[i], &old_fatal[i], nullptr);
-  sigaction(SIGWINCH, &old_resize, nullptr);
 }
 
 Screen::Size Screen::size() const {
-  winsize size{};
-  if (ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0 || size.ws_row == 0) return {};
-  return {size.ws_col, size.ws_row};
+  return {static_cast<std::size_t>(std::max(::getmaxx(stdscr), 1)),
+          static_cast<std::size_t>(std::max(::getmaxy(stdscr), 1))};
 }
 
-bool Screen::draw(const std::vector<std::string> &lines) {
+void Screen::draw(const std::vector<Line> &lines) {
+  (void)::erase();
   const std::size_t room = std::min(lines.size(), size().lines);
-  std::string text = "\033[H";
   for (std::size_t i = 0; i < room; ++i) {
-    // Erases before writing: after a line as wide as the terminal the cursor is still on its last character.
-    const bool last = i + 1 == room;
-    text += (last ? "\033[J" : "\033[K") + lines[i] + (last ? "" : "\r\n");
+    (void)::move(static_cast<int>(i), 0);
+    for (const Span &span : lines[i]) {
+      (void)::attrset(static_cast<int>(attributes_of(span.tint, colour_) | (span.reversed ? A_REVERSE : A_NORMAL)));
+      (void)::addstr(span.text.c_str());  // fails at the last column of the last line, after having written it
+    }
   }
-  return write_all(text);
+  (void)::refresh();
 }
 
 KeyPress Screen::wait(Duration timeout) {
-  if (was_resized != 0) {
-    was_resized = 0;
-    return {Key::Resize};
-  }
-  if (!pending_.empty()) return take_key(pending_);
+  // Keys that came together are in ncurses' buffer, of which poll() does not know.
+  if (const int code = ::getch(); code != ERR) return press_of(code);
   pollfd input{STDIN_FILENO, POLLIN, 0};
   const auto milliseconds = static_cast<int>(std::clamp<Duration>(timeout / kMillisecond, 0, 60'000));
   const int ready = ::poll(&input, 1, milliseconds);
-  if (ready <= 0) return {was_resized != 0 ? Key::Resize : Key::None};
-  std::array<char, 256> bytes{};
-  const ssize_t got = ::read(STDIN_FILENO, bytes.data(), bytes.size());
-  if (got < 0 && (errno == EINTR || errno == EAGAIN)) return {};
-  if (got <= 0) return {Key::Closed};
-  pending_.assign(bytes.data(), static_cast<std::size_t>(got));
-  return take_key(pending_);
-}
-
-KeyPress take_key(std::string &bytes) {
-  struct Sequence {
-    std::string_view bytes;
-    Key key;
-  };
-  static constexpr std::array<Sequence, 12> kSequences{{{"\033[A", Key::Up},
-                                                        {"\033[B", Key::Down},
-                                                        {"\033OA", Key::Up},
-                                                        {"\033OB", Key::Down},
-                                                        {"\033[5~", Key::PageUp},
-                                                        {"\033[6~", Key::PageDown},
-                                                        {"\033[H", Key::Home},
-                                                        {"\033[F", Key::End},
-                                                        {"\033[1~", Key::Home},
-                                                        {"\033[4~", Key::End},
-                                                        {"\r", Key::Enter},
-                                                        {"\n", Key::Enter}}};
-  for (const Sequence &sequence : kSequences) {
-    if (bytes.compare(0, sequence.bytes.size(), sequence.bytes) != 0) continue;
-    bytes.erase(0, sequence.bytes.size());
-    return {sequence.key};
-  }
-  if (bytes.empty()) return {};
-  if (bytes[0] == '\033') {
-    const bool alone = bytes.size() == 1;
-    bytes.clear();  // an unknown sequence must not be read as letters
-    return {alone ? Key::Escape : Key::None};
-  }
-  const char text = bytes[0];
-  bytes.erase(0, 1);
-  const auto code = static_cast<unsigned char>(text);
-  if (code < 0x20 || code >= 0x7f) return {};
-  return {Key::Text, text};
+  const int code = ::getch();  // also after a signal, which can be a change of the size
+  if (code != ERR) return press_of(code);
+  // Readable without a byte to read: hung up.
+  if (ready > 0) return {(input.revents & (POLLHUP | POLLERR | POLLNVAL)) != 0 ? Key::Closed : Key::None};
+  return {};
 }
 
 }  // namespace redag::cli

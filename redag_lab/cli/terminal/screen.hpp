@@ -1,36 +1,56 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Takes over a terminal: alternate screen, single keys, the current size. The destructor restores the previous state,
-// and so do handlers for crashes and catchable signals. One object at a time, on one thread.
+// A whole terminal by ncurses: lines with tints, keys, mouse, its size. The destructor restores the terminal, and so do
+// handlers for crashes and catchable signals. One object at a time, on one thread.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
-#include <string>
 #include <vector>
 
 #include "redag/base/time.hpp"
+#include "redag_lab/cli/terminal/styled.hpp"
 
 namespace redag::cli {
 
-enum class Key : std::uint8_t { None, Text, Up, Down, PageUp, PageDown, Home, End, Enter, Escape, Resize, Closed };
+enum class Key : std::uint8_t {
+  None,
+  Text,
+  Up,
+  Down,
+  PageUp,
+  PageDown,
+  Home,
+  End,
+  Enter,
+  Escape,
+  Backspace,
+  Help,
+  Click,
+  WheelUp,
+  WheelDown,
+  Resize,
+  Closed,  // the terminal is gone
+};
 
 struct KeyPress {
   Key key = Key::None;
-  char text = 0;  // Key::Text: an ASCII character
+  char text = 0;           // Text: an ASCII character
+  std::size_t line = 0;    // Click
+  std::size_t column = 0;  // Click
 };
-
-/// Parses and removes the first key from the bytes that a terminal sent. Unknown sequences are None.
-[[nodiscard]] KeyPress take_key(std::string &bytes);
 
 class Screen {
  public:
-  /// Takes over standard input and standard output, which must be terminals (is_possible()).
-  Screen();
+  /// Takes over standard input and standard output. Requires is_possible(). Without `colour`, tints are told apart by
+  /// weight only.
+  explicit Screen(bool colour);
   ~Screen();
   Screen(const Screen &) = delete;
   Screen &operator=(const Screen &) = delete;
 
+  /// True if both are terminals, of a kind that can be drawn on.
   [[nodiscard]] static bool is_possible();
 
   struct Size {
@@ -39,15 +59,14 @@ class Screen {
   };
   [[nodiscard]] Size size() const;
 
-  /// Replaces the screen by the lines from the top, as many as fit. None of them may be wider than the screen. Returns
-  /// false if the terminal is gone.
-  [[nodiscard]] bool draw(const std::vector<std::string> &lines);
+  /// Replaces the screen by the lines from the top, as many as fit. Sends the terminal what has changed.
+  void draw(const std::vector<Line> &lines);
 
   /// Returns the next key, or None after `timeout` or a signal.
   [[nodiscard]] KeyPress wait(Duration timeout);
 
  private:
-  std::string pending_;
+  bool colour_;
 };
 
 }  // namespace redag::cli
