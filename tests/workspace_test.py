@@ -23,12 +23,15 @@ SYSTEM_KEYS = {
     "cli11": "libcli11-dev",
     "cmake": "cmake",
     "fmt": "libfmt-dev",
+    "libcpp-httplib-dev": "libcpp-httplib-dev",
     "libexpected-dev": "libexpected-dev",
     "libgmock-dev": "libgmock-dev",
     "libgtest-dev": "libgtest-dev",
+    "libncurses-dev": "libncurses-dev",
     "libsqlite3-dev": "libsqlite3-dev",
     "libyaml-dev": "libyaml-dev",
     "nlohmann-json-dev": "nlohmann-json3-dev",
+    "pkg-config": "pkg-config",
     "python3-pytest": "python3-pytest",
     "tbb": "libtbb-dev",
     "zlib": "zlib1g-dev",
@@ -38,13 +41,14 @@ ROS_KEYS = {"ament_cmake", "ament_index_python", "composition_interfaces", "diag
             "rclcpp", "rclcpp_action", "rclcpp_components", "rclcpp_lifecycle", "rcutils", "rmw", "ros2cli", "rosgraph_msgs",
             "std_msgs", "std_srvs", "test_msgs", "tracetools"}
 # Names that find_package() looks for, with the rosdep key that installs them. The C library has the threads,
-# and packages are built without MPI.
+# and packages are built without MPI, Prometheus and LTTng.
 CMAKE_PACKAGES = {"fmt": "fmt", "nlohmann_json": "nlohmann-json-dev", "tl-expected": "libexpected-dev",
                   "CLI11": "cli11", "TBB": "tbb", "GTest": "libgtest-dev", "LibYAML": "libyaml-dev", "ZLIB": "zlib",
-                  "SQLite3": "libsqlite3-dev", "MPI": None, "Threads": None}
+                  "SQLite3": "libsqlite3-dev", "Curses": "libncurses-dev", "PkgConfig": "pkg-config", "MPI": None,
+                  "prometheus-cpp": None, "LttngUst": None, "Threads": None}
 # Folders that headers are included from, with the rosdep key that installs them. Others have the name of their package.
 HEADER_FOLDERS = {"fmt": "fmt", "nlohmann": "nlohmann-json-dev", "tl": "libexpected-dev", "CLI": "cli11", "tbb": "tbb",
-                  "oneapi": "tbb", "gtest": "libgtest-dev", "gmock": "libgmock-dev", "sys": None, "linux": None, "bits": None}
+                  "oneapi": "tbb", "prometheus": None, "gtest": "libgtest-dev", "gmock": "libgmock-dev", "arpa": None, "sys": None, "linux": None, "bits": None}
 # Peers for comparisons, which are used where they are installed.
 OPTIONAL = {"autoware_reference_system", "cm_executors", "reference_interfaces", "reference_system"}
 # Folders of the repository that a package uses where they are there, and does without elsewhere.
@@ -95,6 +99,12 @@ class Colcon(unittest.TestCase):
 
     def test_what_the_executor_needs(self):
         self.assertEqual(colcon_list("--packages-up-to", "redag_rclcpp"), ["redag", "redag_analysis", "redag_rclcpp"])
+
+
+class Citation(unittest.TestCase):
+    def test_the_version_is_the_one_of_the_packages(self):
+        stated = re.search(r"(?m)^version: (.+)$", (SOURCE / "CITATION.cff").read_text())[1]
+        self.assertEqual(stated, version_of("redag"))
 
 
 class Rosdep(unittest.TestCase):

@@ -43,13 +43,14 @@ function(redag_add_library target)
   endif()
 endfunction()
 
-# redag_install_library(<target>...) installs targets for find_package(<project>), with the config file in the project's
-# folder.
-function(redag_install_library)
+# redag_install_library(<component> <target>...) installs targets for find_package(<project>), with the config file in the
+# project's folder. A shared library is the component; all else belongs to the directory's default component.
+function(redag_install_library component)
   set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/${PROJECT_NAME})
   install(TARGETS ${ARGN} EXPORT ${PROJECT_NAME}_targets
     RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR}
     LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}
+      COMPONENT ${component} NAMELINK_COMPONENT ${CMAKE_INSTALL_DEFAULT_COMPONENT_NAME}
     ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
   install(EXPORT ${PROJECT_NAME}_targets NAMESPACE redag:: DESTINATION ${package_dir})
   list(GET ARGN 0 library)

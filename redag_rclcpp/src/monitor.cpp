@@ -335,7 +335,7 @@ redag::Result<void> Monitor::Impl::finish() {
     }
     if (problems.empty()) {
       RCLCPP_INFO(node_->get_logger(),
-                  "wrote %s: metrics.json, summary.json, jobs.csv, events.jsonl, trace.json (open trace.json in "
+                  "wrote %s: metrics.json, summary.json, jobs.csv, events.jsonl, trace.pftrace (open trace.pftrace in "
                   "https://ui.perfetto.dev)",
                   options_.trace.c_str());
     }

@@ -193,11 +193,12 @@ bool has_all_wcets(const redag::Workload &workload) {
 }
 
 std::string read_trace(Reader &reader) {
-  return reader.text({"trace",
-                      "Folder for events.jsonl, jobs.csv, summary.json and trace.json, which are written when spinning "
-                      "ends; empty: none",
-                      "the path of a folder"},
-                     "");
+  return reader.text(
+      {"trace",
+       "Folder for events.jsonl, jobs.csv, summary.json and trace.pftrace, which are written when spinning "
+       "ends; empty: none",
+       "the path of a folder"},
+      "");
 }
 
 std::optional<redag::Calibration> read_overheads(Reader &reader) {

@@ -49,21 +49,17 @@ redag::Diagnostics TraceKeeper::write(const std::string &folder, const ReDAGExec
   keep(redag::metrics::write_summary(folder + "/summary.json", summary, trace.info));
   keep(redag::metrics::write_jobs_csv(folder + "/jobs.csv", trace.info.workload,
                                       redag::metrics::fold_jobs(trace.info.workload, trace.events)));
-  keep(redag::metrics::write_perfetto(folder + "/trace.json", trace));
+  keep(redag::metrics::write_perfetto(folder + "/trace.pftrace", trace));
   keep(redag::trace::write_trace(folder + "/events.jsonl", trace));
   return problems;
 }
 
 std::optional<std::string> FlightLog::prepare(const std::string &folder) {
   folder_ = folder + "/flight";
-  if (!redag::trace::has_flight_record(folder_)) return std::nullopt;
-  // Moves an earlier record aside: a robot must start again after a crash, and its user may want the record.
-  std::string aside;
-  std::error_code error;
-  for (int number = 1; aside.empty() || std::filesystem::exists(aside, error); ++number)
-    aside = fmt::format("{}.{}", folder_, number);
-  std::filesystem::rename(folder_, aside, error);
-  return aside;
+  // A robot must start again after a crash, and its user may want the record.
+  redag::Result<std::string> aside = redag::trace::move_record_aside(folder_);
+  if (!aside || aside->empty()) return std::nullopt;  // where it could not be moved, creating the next one fails
+  return *std::move(aside);
 }
 
 redag::Result<void> FlightLog::add(const std::vector<redag::JobEvent> &events, const ReDAGExecutor &executor) {

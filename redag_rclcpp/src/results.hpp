@@ -27,7 +27,7 @@ class TraceKeeper {
   /// Keeps events until `most_events` is reached. Later events only set is_cut().
   void add(const std::vector<redag::JobEvent> &events);
 
-  /// Writes summary.json, jobs.csv, trace.json and events.jsonl (docs/results_format.md). Call it after spinning.
+  /// Writes summary.json, jobs.csv, trace.pftrace and events.jsonl (docs/results_format.md). Call it after spinning.
   /// Returns all problems.
   [[nodiscard]] redag::Diagnostics write(const std::string &folder, const ReDAGExecutor &executor);
 

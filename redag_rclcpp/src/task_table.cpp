@@ -181,7 +181,8 @@ std::vector<CallbackStats> TaskTable::stats(const redag::runtime::Engine &engine
 
 void TaskTable::sample(const redag::runtime::Engine &engine, const std::map<std::string, redag::Duration> &bounds,
                        redag::live::Sample &sample) const {
-  for (const redag::Dag &dag : dags_) sample.dags.push_back({dag.name, dag.max_active});
+  for (const redag::Dag &dag : dags_) sample.dags.push_back({dag.name, dag.max_active, dag.deadline});
+  redag::runtime::add_threads(sample, engine);
   struct Row {
     std::shared_ptr<Callback> callback;
     redag::live::TaskSample task;
@@ -207,6 +208,21 @@ void TaskTable::sample(const redag::runtime::Engine &engine, const std::map<std:
     const redag::runtime::TaskFigures figures = engine.figures(TaskId(row.task.key));
     redag::runtime::fill(row.task, figures);
     row.task.misses = row.callback->late() + figures.jobs.lost();  // as in stats()
+  }
+  // A task whose messages another task of its DAG takes does not answer for the DAG.
+  std::map<std::uint64_t, std::uint32_t> dag_of;
+  std::set<std::uint64_t> followed;
+  for (const Row &row : rows) dag_of.emplace(row.task.key, row.task.dag);
+  for (const Row &row : rows) {
+    for (const TaskId publisher : row.callback->publishers()) {
+      const auto found = dag_of.find(publisher.value);
+      if (found != dag_of.end() && found->second == row.task.dag && publisher.value != row.task.key) {
+        followed.insert(publisher.value);
+      }
+    }
+  }
+  for (Row &row : rows) {
+    if (followed.count(row.task.key) > 0) row.task.end_to_end.reset();
   }
   // As in stats(): skips callbacks that have gone meanwhile.
   const redag::LockGuard guard(lock_);

@@ -252,7 +252,7 @@ TEST_F(ContainerTest, ComponentsRunAndResultsAreWrittenAtTheEnd) {
   EXPECT_EQ(container.wait(), 0);
   EXPECT_THAT(text(), HasSubstr("wrote " + results.string()));
   EXPECT_TRUE(std::filesystem::exists(folder_ / "last.json"));
-  for (const char *name : {"summary.json", "jobs.csv", "trace.json", "metrics.json"}) {
+  for (const char *name : {"summary.json", "jobs.csv", "trace.pftrace", "metrics.json"}) {
     EXPECT_TRUE(std::filesystem::exists(results / name)) << name;
   }
   const auto trace = redag::trace::read_trace(results / "events.jsonl");

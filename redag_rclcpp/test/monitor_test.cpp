@@ -295,7 +295,7 @@ TEST_F(MonitorTest, ResultsAreWrittenWhenSpinningHasEnded) {
   EXPECT_EQ(trace->info.lost_events, 0U);
   const auto check = redag::metrics::check_trace(*trace, redag::metrics::rules_for(trace->info));
   EXPECT_TRUE(check.ok()) << check.to_string();
-  for (const char *name : {"jobs.csv", "trace.json"})
+  for (const char *name : {"jobs.csv", "trace.pftrace"})
     EXPECT_GT(std::filesystem::file_size(results / name), 100U) << name;
   const Json summary = Json::parse(std::ifstream(results / "summary.json"));
   EXPECT_GE(summary["total"]["finished"], 5);

@@ -75,7 +75,7 @@ redag::Diagnostics write_results(const WorkloadRun &run, const std::string &fold
   keep(redag::metrics::write_summary(folder + "/summary.json", run.summary, trace.info));
   keep(redag::metrics::write_jobs_csv(folder + "/jobs.csv", trace.info.workload,
                                       redag::metrics::fold_jobs(trace.info.workload, trace.events)));
-  keep(redag::metrics::write_perfetto(folder + "/trace.json", trace));
+  keep(redag::metrics::write_perfetto(folder + "/trace.pftrace", trace));
   keep(redag::trace::write_trace(folder + "/events.jsonl", trace));
   if (run.scheduler) keep(redag::trace::write_trace(folder + "/scheduler_events.jsonl", run.scheduler->trace));
   keep(write_check(folder + "/check.json", run));

@@ -54,7 +54,7 @@ struct WorkloadRun {
 [[nodiscard]] redag::Result<WorkloadRun> run_as_nodes(const redag::Workload &workload,
                                                       const WorkloadRunOptions &options);
 
-/// Writes jobs.csv, summary.json, trace.json, events.jsonl, check.json with the verdicts, and for ReDAGExecutor
+/// Writes jobs.csv, summary.json, trace.pftrace, events.jsonl, check.json with the verdicts, and for ReDAGExecutor
 /// scheduler_events.jsonl. Returns all problems.
 [[nodiscard]] redag::Diagnostics write_results(const WorkloadRun &run, const std::string &folder);
 

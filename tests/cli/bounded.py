@@ -62,6 +62,22 @@ class Memory(Case):
             self.assertEqual(task["response"]["percentile_error"], 1 / 256)
         self.assertLess(sizes[1] - sizes[0], 16 * MIB)
 
+    def test_files_of_long_runs_are_written_and_read_in_bounded_memory(self):
+        """Twice the events, 5 and 10 million: their 32 bytes each would be 160 MB more."""
+        fast = self.write("fast.yaml", "name: fast\nplatform: {workers: 2}\ndags:\n" + "".join(
+            f"  - {{name: d{i}, tasks: [{{name: t, period: 1us, wcet: 300ns, bcet: 100ns}}]}}\n" for i in range(2)))
+        sizes = {"simulate": [], "check-trace": [], "events": []}
+        for duration in ("600ms", "1200ms"):
+            out = self.folder / duration
+            commands = {"simulate": [fast, "--duration", duration, "--max-events", 1_000_000_000, "--out", out],
+                        "check-trace": [out], "events": [out, "--format", "redag", "-o", self.folder / "copy.redag"]}
+            for command, arguments in commands.items():
+                status, text, size = peak(command, *arguments)
+                self.assertEqual(status, 0, text)
+                sizes[command].append(size)
+        for command, (short, long) in sizes.items():
+            self.assertLess(long - short, 16 * MIB, command)
+
     def test_a_workload_in_nanoseconds_ends(self):
         tiny = self.write("tiny.yaml", "name: tiny\nplatform: {workers: 1}\ndags:\n"
                                        "  - {name: d, tasks: [{name: t, period: 10ns, wcet: 3ns}]}\n")

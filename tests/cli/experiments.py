@@ -401,7 +401,7 @@ class Factorial(Case):
                           "workloads: cart.yaml\nexecutors: [ideal, redag-none, mte, ste]\n")
         program = self.write("run_workload", f"""#!/bin/sh
 executor=${{2#--executor=}} duration=${{3#--duration=}} warm_up=${{4#--warm-up=}} seed=${{5#--seed=}} out=${{6#--out=}}
-exec "{PROGRAM}" simulate "$1" --executor "$executor" --duration "$duration" --warm-up "$warm_up" --seed "$seed" --out "$out"
+exec "{PROGRAM}" simulate "$1" --executor "$executor" --duration "$duration" --warm-up "$warm_up" --seed "$seed" --events jsonl --out "$out"
 """)
         program.chmod(0o755)
         self.run_plan(plan, "ros2", "--run-workload", program)
@@ -420,7 +420,8 @@ exec "{PROGRAM}" simulate "$1" --executor "$executor" --duration "$duration" --w
                                  "workloads: cart.yaml\nexecutors: [ideal, mte]\n"), "simulated")
         for run in ("1", "2"):
             place = self.folder / "recorded" / "mte" / run
-            self.expect(redag("simulate", cart, "--executor", "mte", "--duration", "500ms", "--seed", run, "--out", place), 0)
+            self.expect(redag("simulate", cart, "--executor", "mte", "--duration", "500ms", "--seed", run,
+                              "--events", "jsonl", "--out", place), 0)
             events = place / "events.jsonl"
             events.write_text(events.read_text().replace('"driver":"simulator"', '"driver":"ros_nodes"', 1))
         both = ("experiment", "merge", self.folder / "simulated", self.folder / "recorded")

@@ -4,13 +4,14 @@
 
 """Tests `redag top`, which watches runs.
 
-Usage: live.py PROGRAM SOURCE_DIR. Uses the standard library only.
+Usage: live.py PROGRAM SOURCE_DIR. A terminal is emulated by pyte (python3-pyte).
 """
 import fcntl
 import json
 import os
 import pathlib
 import pty
+import select
 import signal
 import struct
 import subprocess
@@ -18,6 +19,8 @@ import tempfile
 import termios
 import time
 import unittest
+
+import pyte
 
 from program import PROGRAM, Case, main, redag
 
@@ -142,135 +145,206 @@ class Top(Case):
         os.link(self.page(process), folder / self.page(process).name)
 
     def test_on_a_terminal(self):
-        """Tests keys, a restart of the executor, and the terminal afterwards."""
+        """Tests keys, the mouse, a new size, a restart of the executor, and the terminal afterwards."""
         first = self.start()
         self.frame_of(first)
-        screen = Screen(self, first.pid)
-        screen.read_until(f"redag {first.pid}")
+        screen = Terminal(self, first.pid)
+        screen.wait_for(f"redag {first.pid}")
+        screen.wait_for("  sense")
         screen.press("n")
-        screen.read_until("by name")
-        screen.read_until("fast.sense")
+        screen.wait_for("by name")
+        screen.wait_for("fast.sense")
         screen.press("t")
-        screen.read_until("since the start")
-        screen.resize(10, 40)
-        screen.read_until("fast.act")
-        # The line is erased before it is written. Erasing afterwards would remove the last character of a full line,
-        # too.
-        self.assertRegex(screen.read_until("q quit"), r"\033\[J(\033\[\d+m)?\Z")
+        screen.wait_for("since the start")
+        screen.press("fPLAN\r")
+        screen.wait_for("filter: PLAN")
+        screen.wait_for("slow.plan")
+        screen.wait_without("fast.sense")
+        screen.press(ESCAPE)
+        screen.wait_for("fast.sense")
+        screen.press("?")
+        screen.wait_for("COLUMNS")
+        screen.press("x")
+        screen.wait_without("COLUMNS")
+        screen.click_title("p99")
+        screen.wait_for("by p99")
+        screen.click_title("p99")
+        screen.wait_for("by p99, reversed")
+        screen.press("i/sense\r")
+        screen.wait_for_marked("fast.sense")
+        screen.resize(12, 40)
+        screen.wait_for("fast.act")
+        screen.wait_for("? help")
         first.kill()
         first.wait(timeout=100)
-        screen.read_until("the executor has ended")
+        screen.resize(24, 80)
+        screen.wait_for("the executor has ended")
         second = self.start()
-        screen.read_until(f"redag {second.pid}")
+        screen.wait_for(f"redag {second.pid}")
         screen.press("q")
         screen.end()
+
+    def test_a_signal_gives_the_terminal_back(self):
+        process = self.start()
+        self.frame_of(process)
+        for number, status in ((signal.SIGINT, 0), (signal.SIGTERM, 0), (signal.SIGHUP, -signal.SIGHUP)):
+            screen = Terminal(self, process.pid)
+            screen.wait_for(f"redag {process.pid}")
+            os.kill(screen.pid, number)
+            screen.end(status)
+
+    def test_without_colours(self):
+        process = self.start()
+        self.frame_of(process)
+        screen = Terminal(self, process.pid, "--ascii", NO_COLOR="1")
+        screen.wait_for("  sense")
+        screen.press("q")
+        screen.end()
+        self.assertNotRegex(screen.sent, r"\033\[(\d+;)*3[1-7]m")
+        self.assertTrue(screen.sent.isascii())
+        process = self.start()
+        self.frame_of(process)
+        plain = redag("top", process.pid, env={**os.environ, "TERM": "dumb"})
+        self.assertNotIn("\033", self.expect(plain, 0, "one frame is printed").stdout)
 
     def test_an_executor_is_chosen(self):
         with tempfile.TemporaryDirectory(dir="/dev/shm") as name:
             folder = pathlib.Path(name)
-            screen = Screen(self, "--folder", folder)
-            screen.read_until("waiting for one")
+            screen = Terminal(self, "--folder", folder)
+            screen.wait_for("waiting for one")
             first, second = sorted((self.start(), self.start()), key=lambda process: process.pid)
             self.linked(folder, first)
-            screen.read_until(f"redag {first.pid}")  # the only executor
+            screen.wait_for(f"redag {first.pid}")  # the only executor
             self.linked(folder, second)
             screen.press("l")
-            screen.read_until("Which executor?")
-            screen.read_until(f"> 1 {first.pid}")
-            screen.read_until(f"2 {second.pid}")
+            screen.wait_for("Which executor?")
+            screen.wait_for(f"> 1 {first.pid}")
+            screen.wait_for(f"2 {second.pid}")
             screen.press(DOWN)
-            screen.read_until(f"> 2 {second.pid}")
+            screen.wait_for(f"> 2 {second.pid}")
             screen.press(DOWN + UP)  # the selection stays within the list
-            screen.read_until(f"> 1 {first.pid}")
+            screen.wait_for(f"> 1 {first.pid}")
             screen.press(PAGE_DOWN)
-            screen.read_until(f"> 2 {second.pid}")
+            screen.wait_for(f"> 2 {second.pid}")
             screen.press(PAGE_UP)
-            screen.read_until(f"> 1 {first.pid}")
+            screen.wait_for(f"> 1 {first.pid}")
             screen.press("7")  # there are only two
             screen.press(END)
-            screen.read_until(f"> 2 {second.pid}")
+            screen.wait_for(f"> 2 {second.pid}")
             screen.press("\r")
-            screen.read_until(f"redag {second.pid}")
+            screen.wait_for(f"redag {second.pid}")
             screen.press("l")
-            screen.read_until("Which executor?")
+            screen.wait_for("Which executor?")
             screen.press("1")
-            screen.read_until(f"redag {first.pid}")
+            screen.wait_for(f"redag {first.pid}")
             screen.press("l")
-            screen.read_until("Which executor?")
+            screen.wait_for("Which executor?")
             screen.press(ESCAPE)
-            screen.read_until(f"redag {first.pid}")
+            screen.wait_for(f"redag {first.pid}")
             screen.press(ESCAPE)
             screen.end()
 
     def test_what_is_shown_is_chosen(self):
         process = self.start()
         self.frame_of(process)
-        screen = Screen(self, process.pid)
+        screen = Terminal(self, process.pid, "--sort", "cpu", "--reverse", "--filter", "s")
+        screen.wait_for("sorted by cpu, reversed")
+        screen.wait_for("filter: s")
+        screen.press("i" + ESCAPE)
+        screen.wait_without("filter: s")
         for key, order in {"r": "rate", "p": "p99", "x": "max", "m": "misses", "c": "cpu", "d": "dag"}.items():
             screen.press(key)
-            screen.read_until(f"by {order}")
+            screen.wait_for(f"by {order}")
         screen.press("i")
-        screen.read_until("reversed")
+        screen.wait_for("reversed")
         screen.press("g")
-        screen.read_until("reversed")
-        self.assertNotIn("sense", screen.read_until("q quit"))
+        screen.wait_without("  sense")
         screen.press("g")
-        screen.read_until("sense")
+        screen.wait_for("  sense")
         screen.press(" ")
-        screen.read_until("paused")
-        screen.press(" ")
-        # Leaves room for two of five rows: two DAGs and three tasks.
-        screen.press("i")
-        screen.resize(9, 120)
+        screen.wait_for("paused")
+        screen.press(" i")
+        screen.wait_without("paused")
+        # Leaves room for some of five rows: two DAGs and three tasks.
+        screen.resize(10, 120)
+        screen.wait_for("more below")
         screen.press(END)
-        screen.read_until("plan")
+        screen.wait_for("  plan")
+        screen.wait_for("more above")
         screen.press(HOME)
-        screen.read_until("sense")
+        screen.wait_for("  sense")
         screen.press("q")
         screen.end()
 
 
-UP, DOWN, PAGE_UP, PAGE_DOWN, HOME, END = "\033[A", "\033[B", "\033[5~", "\033[6~", "\033[H", "\033[F"
+UP, DOWN, PAGE_UP, PAGE_DOWN, HOME, END = "\033OA", "\033OB", "\033[5~", "\033[6~", "\033[1~", "\033[4~"
 ESCAPE = "\033"
 
 
-class Screen:
-    """Runs `redag top` on a terminal of its own."""
+class Terminal:
+    """Runs `redag top` on a terminal of its own, and knows what its screen shows."""
 
-    def __init__(self, case, *arguments):
-        self.case, self.seen = case, ""
+    def __init__(self, case, *arguments, **environment):
+        self.case, self.sent = case, ""
         try:
             self.pid, self.terminal = pty.fork()
         except OSError as error:
             raise unittest.SkipTest(f"no pseudo-terminal to be had here: {error}") from error
         if self.pid == 0:
-            os.environ.update(TERM="xterm")
+            os.environ.pop("NO_COLOR", None)
+            os.environ.update(environment, TERM="screen-256color")  # one that pyte understands
             try:
                 os.execv(PROGRAM, [str(PROGRAM), "top", *map(str, arguments), "--interval", "50ms"])
             finally:
                 os._exit(127)
-        self.resize(24, 120)
-        self.read_until("\033[?1049h")
+        self.screen = pyte.Screen(80, 24)
+        self.stream = pyte.Stream(self.screen)
+        self.resize(24, 80)
 
     def resize(self, lines, columns):
         fcntl.ioctl(self.terminal, termios.TIOCSWINSZ, struct.pack("HHHH", lines, columns, 0, 0))
+        self.screen.resize(lines, columns)
 
     def press(self, keys):
         os.write(self.terminal, keys.encode())
 
-    def read_until(self, text):
-        """Returns the output up to `text`."""
-        deadline = time.monotonic() + 100
-        while text not in self.seen:
-            self.case.assertLess(time.monotonic(), deadline, f"no '{text}' in: {self.seen[-3000:]}")
-            self.seen += os.read(self.terminal, 65536).decode(errors="replace")
-        before, _, self.seen = self.seen.partition(text)
-        return before
+    def click_title(self, text):
+        """Clicks on the title of a column."""
+        line, row = next((i, row) for i, row in enumerate(self.screen.display) if row.startswith("task "))
+        column = row.index(text)
+        for button in (0, 3):  # pressed, released
+            os.write(self.terminal, b"\033[M" + bytes([32 + button, 33 + column, 33 + line]))
 
-    def end(self):
-        self.read_until("\033[?1049l")
+    def wait_for(self, text):
+        self.wait(lambda: any(text in row for row in self.screen.display), f"no '{text}'")
+
+    def wait_without(self, text):
+        self.wait(lambda: not any(text in row for row in self.screen.display), f"still '{text}'")
+
+    def wait_for_marked(self, text):
+        def is_marked():
+            return any(text in row and self.screen.buffer[i][row.index(text)].reverse
+                       for i, row in enumerate(self.screen.display))
+        self.wait(is_marked, f"'{text}' is not marked")
+
+    def wait(self, is_so, what):
+        """Reads until the condition holds."""
+        deadline = time.monotonic() + 100
+        while not is_so():
+            self.case.assertLess(time.monotonic(), deadline, what + " on:\n" + "\n".join(self.screen.display))
+            if select.select([self.terminal], [], [], 1)[0]:
+                self.read()
+
+    def read(self):
+        text = os.read(self.terminal, 65536).decode(errors="replace")
+        self.sent += text
+        self.stream.feed(text)
+
+    def end(self, status=0):
+        self.wait(lambda: "\033[?1049l" in self.sent, "the terminal was not given back")
         # Closing the terminal earlier would hang the program up.
-        self.case.assertEqual(os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1]), 0)
+        self.case.assertEqual(os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1]), status)
+        self.case.assertIn("\033[?1049h", self.sent)
         os.close(self.terminal)
 
 

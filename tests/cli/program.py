@@ -24,6 +24,7 @@ import unittest
 if len(sys.argv) < 3:
     sys.exit(f"usage: {sys.argv[0]} PROGRAM SOURCE_DIR [unittest arguments]")
 PROGRAM, SOURCE = (pathlib.Path(argument).resolve() for argument in sys.argv[1:3])
+os.environ.pop("COLUMNS", None)  # tests choose the width themselves
 # Set for builds with sanitizers, which run several times slower. They look for other faults than these tests, which
 # also run in full without sanitizers.
 SANITIZED = os.environ.get("REDAG_SANITIZED") == "1"

@@ -2,14 +2,19 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Tests the commands that read results: `redag diff`, `check-trace`, `report`, `tune`.
+"""Tests the commands that read results: `redag diff`, `check-trace`, `events`, `report`, `tune`.
 
 Usage: results.py PROGRAM SOURCE_DIR. Uses the standard library only.
 """
+import csv
 import json
+import os
 import re
+import struct
 import subprocess
+import zlib
 
+from pftrace import Picture
 from program import CART, MISTAKEN, PROGRAM, SOURCE, Case, body, interrupt, main, redag
 
 
@@ -64,7 +69,7 @@ class Diff(Case):
         self.assertIn("caution: the sides were charged different overheads: none, and release 0s, dispatch 0.1ms, preempt 0s",
                       self.expect(redag("diff", simulated, slowed), 0).stdout)
         on_threads = self.folder / "threads"
-        self.expect(redag("run", self.cart, "--duration", "500ms", "--out", on_threads), 0)
+        self.expect(redag("run", self.cart, "--duration", "500ms", "--events", "jsonl", "--out", on_threads), 0)
         text = self.expect(redag("diff", simulated, on_threads), 0).stdout
         self.assertIn("caution: one side comes from 'simulator', the other from 'threads'", text)
         self.assertIn("caution: one side has a single run", text)
@@ -81,7 +86,7 @@ class Diff(Case):
         self.expect(redag("diff", one), 2, "B is required")
         self.expect(redag("diff", one, self.folder / "nowhere"), 2, "nowhere")
         (self.folder / "empty").mkdir()
-        self.expect(redag("diff", one, self.folder / "empty"), 2, "no events.jsonl")
+        self.expect(redag("diff", one, self.folder / "empty"), 2, "no events.redag")
         self.expect(redag("diff", one, one, "--tolerance", "2"), 2, "--tolerance: '2' is not a number from 0 to 0.99")
         self.expect(redag("diff", one, one, "--replicates", "1"), 2, "--replicates")
 
@@ -89,7 +94,7 @@ class Diff(Case):
 class CheckTrace(Case):
     def trace(self):
         out = self.folder / "out"
-        self.expect(redag("simulate", self.cart, "--duration", "1s", "--out", out), 0)
+        self.expect(redag("simulate", self.cart, "--duration", "1s", "--events", "jsonl", "--out", out), 0)
         return out / "events.jsonl"
 
     def test_damaged_traces(self):
@@ -119,7 +124,189 @@ class CheckTrace(Case):
         self.expect(redag("check-trace", self.write("nodes.jsonl", nodes)), 0)
 
     def test_folder_without_traces(self):
-        self.expect(redag("check-trace", self.folder), 2, "no events.jsonl")
+        self.expect(redag("check-trace", self.folder), 2, "no events.redag")
+
+
+KINDS = ["released", "ready", "deferred", "dispatched", "started", "preempted", "resumed", "finished", "skipped", "aborted",
+         "exceeded", "high_mode", "low_mode", "executed"]
+REASONS = ["none", "overrun", "precedence", "queue_full", "dag_full", "removed", "exception", "budget", "no_data", "degraded"]
+
+
+def decoded(code, base):
+    """Decodes a block of events as docs/results_format.md describes it, and nothing but the description."""
+    place = 0
+
+    def number():
+        nonlocal place
+        value = shift = 0
+        while True:
+            byte = code[place]
+            place += 1
+            value |= (byte & 0x7F) << shift
+            if byte < 0x80:
+                return value
+            shift += 7
+
+    def difference():
+        folded = number()
+        return folded >> 1 if folded % 2 == 0 else -(folded + 1 >> 1)
+
+    count = number()
+    kinds = [(KINDS[byte & 15], REASONS[byte >> 4]) for byte in code[place:place + count]]
+    place += count
+    times = []
+    for _ in range(count):
+        times.append((times[-1] if times else base) + difference())
+    tasks = [number() for _ in range(count)]
+    jobs, workers, values, last = [], [], [], {}
+    for column, name in (jobs, "job"), (workers, "worker"):
+        for task in tasks:
+            last[name, task] = last.get((name, task), 0) + difference()
+            column.append(last[name, task])
+    for (kind, _), time, task in zip(kinds, times, tasks):
+        expected = 0
+        if kind in ("released", "ready", "dispatched"):
+            expected = last.get((kind, task), base)
+        elif kind in ("started", "finished", "aborted", "low_mode"):
+            expected = time
+        values.append(expected + difference())
+        last[kind, task] = values[-1]
+    assert place == len(code)
+    return [[time, kind, task, job, worker - 1, value, reason] for (kind, reason), time, task, job, worker, value in
+            zip(kinds, times, tasks, jobs, workers, values)]
+
+
+def blocks_of(data):
+    """Returns the blocks of an events.redag: their kind, time and content."""
+    assert data[:16] == b"redag.events/2\r\n"
+    blocks, place = [], 16
+    while place < len(data):
+        crc, kind, length, whole, _, base = struct.unpack_from("<IIIIQq", data, place)
+        content = data[place + 32:place + 32 + length]
+        assert crc == zlib.crc32(data[place + 4:place + 32 + length])
+        blocks.append((kind, base, content if kind == 3 else zlib.decompress(content)))
+        assert len(blocks[-1][2]) == whole
+        place += 32 + length
+    return blocks
+
+
+class Events(Case):
+    def results(self, name, *arguments, duration="2s"):
+        out = self.folder / name
+        self.expect(redag("simulate", self.cart, "--duration", duration, "--out", out, *arguments), 0)
+        return out
+
+    def test_both_forms_hold_the_same(self):
+        dated = {**os.environ, "SOURCE_DATE_EPOCH": "1700000000"}
+        text, blocks = self.folder / "text", self.folder / "blocks"
+        for out, form in (text, "jsonl"), (blocks, "redag"):
+            self.expect(redag("simulate", self.cart, "--duration", "20s", "--events", form, "--out", out, env=dated), 0)
+        lines = (text / "events.jsonl").read_text().splitlines()
+        printed = self.expect(redag("events", blocks), 0).stdout.splitlines()
+        self.assertEqual(printed[1:], lines[1:])
+        self.assertEqual(json.loads(printed[0])["run"], json.loads(lines[0])["run"])
+        self.assertEqual((text / "jobs.csv").read_bytes(), (blocks / "jobs.csv").read_bytes())
+        self.assertLess((blocks / "events.redag").stat().st_size, (text / "events.jsonl").stat().st_size / 5)
+        # Every reader takes either.
+        for command in "check-trace", "why":
+            self.assertEqual(*[self.expect(redag(command, out), 0).stdout.replace(str(out / name), "").replace(str(out), "")
+                               for out, name in ((text, "events.jsonl"), (blocks, "events.redag"))])
+        groups = [self.document(redag("report", out, "--json"), "redag.report/2")["groups"][0] for out in (text, blocks)]
+        for key in "verdict", "total", "dags", "tasks", "timeline", "schedule", "why":
+            self.assertEqual(groups[0][key], groups[1][key], key)
+        self.expect(redag("diff", text, blocks, "--check"), 0)
+
+    def test_the_documented_layout_is_that_of_the_file(self):
+        file = self.write("all.yaml", "name: all\nplatform: {workers: 2, preemption: os}\ndags:\n"
+                          "  - name: a\n    max_active: 1\n    tasks: [{name: s, wcet: 3ms, bcet: 1ms, period: 10ms}, "
+                          "{name: t, wcet: 2ms, activation: data, after: s}]\n"
+                          "  - name: b\n    tasks: [{name: u, wcet: 25ms, bcet: 5ms, period: 40ms}, {name: v, wcet: 4ms, "
+                          "period: 5ms, jitter: 1ms}]\n")
+        out = self.folder / "out"
+        self.expect(redag("simulate", file, "--duration", "60s", "--out", out), 0)
+        first, *middle, last = blocks_of((out / "events.redag").read_bytes())
+        printed = [json.loads(line) for line in self.expect(redag("events", out), 0).stdout.splitlines()]
+        self.assertEqual([kind for kind, _, _ in (first, last)], [1, 3])
+        self.assertEqual(json.loads(first[2])["format"], "redag.events/2")
+        self.assertEqual(json.loads(first[2])["run"], printed[0]["run"])
+        self.assertGreater(len(middle), 1)
+        events = [event for _, base, code in middle for event in decoded(code, base)]
+        self.assertEqual(events, printed[1:-1])
+        self.assertGreaterEqual({event[1] for event in events}, {"released", "ready", "dispatched", "preempted", "finished"})
+        self.assertEqual(struct.unpack("<QqQ", last[2]), (len(events), printed[-1]["end_ns"], 0))
+
+    def test_an_old_form_becomes_the_new_one_and_back(self):
+        out = self.results("out", "--events", "jsonl")
+        self.expect(redag("events", out, "--format", "redag", "-o", self.folder / "new.redag"), 0)
+        self.expect(redag("check-trace", self.folder / "new.redag"), 0)
+        self.expect(redag("events", self.folder / "new.redag", "-o", self.folder / "again.jsonl"), 0)
+        first, again = ((folder / name).read_text().splitlines() for folder, name in
+                        ((out, "events.jsonl"), (self.folder, "again.jsonl")))
+        self.assertEqual(again[1:], first[1:])
+
+    def test_csv(self):
+        out = self.results("out")
+        rows = list(csv.DictReader(self.expect(redag("events", out, "--format", "csv"), 0).stdout.splitlines()))
+        lines = redag("events", out).stdout.splitlines()
+        self.assertEqual(len(rows), len(lines) - 2)
+        for row, line in zip(rows, lines[1:]):
+            event = json.loads(line)
+            self.assertEqual([row["time_ns"], row["kind"], row["job"], row["value_ns"], row["reason"]],
+                             [str(event[i]) for i in (0, 1, 3, 5, 6)])
+            self.assertEqual(row["worker"], "" if event[4] < 0 else str(event[4]))
+        self.assertEqual({(row["dag"], row["task"]) for row in rows}, {("fast", "sense"), ("fast", "act"), ("slow", "plan")})
+
+    def test_a_picture_can_be_made_later(self):
+        with_picture, without = self.results("with"), self.results("without", "--picture", "never")
+        self.assertFalse((without / "trace.pftrace").exists())
+        made = self.folder / "made.pftrace"
+        self.expect(redag("events", without, "--format", "perfetto", "-o", made), 0)
+        drawn = [[event for event in Picture(path).events if event[2] != "run"] for path in (with_picture / "trace.pftrace", made)]
+        self.assertEqual(drawn[0], drawn[1])
+
+    def test_what_an_earlier_run_left_is_replaced(self):
+        out = self.results("out", "--events", "jsonl")
+        self.assertTrue((out / "trace.pftrace").exists())
+        self.results("out", "--picture", "never")
+        self.assertEqual(sorted(path.name for path in out.iterdir()), ["events.redag", "jobs.csv", "summary.json"])
+
+    def test_a_long_run_has_no_picture(self):
+        out = self.folder / "out"
+        result = self.expect(redag("simulate", self.cart, "--duration", "700s", "--out", out), 0)
+        self.assertFalse((out / "trace.pftrace").exists())
+        self.assertIn(f"redag events {out} --format perfetto", result.stdout)
+        self.assertGreater(json.loads(redag("check-trace", out, "--json").stdout)["traces"][0]["run"]["events"], 500_000)
+        self.expect(redag("simulate", self.cart, "--duration", "700s", "--picture", "always", "--out", out), 0)
+        self.assertTrue((out / "trace.pftrace").exists())
+
+    def test_damage_is_found_at_its_byte(self):
+        out = self.results("out", duration="100s")
+        events = out / "events.redag"
+        good = events.read_bytes()
+        events.write_bytes(good[:-1])
+        for command in ["check-trace"], ["report"], ["why"], ["events"]:
+            self.expect(redag(*command, out), 2, f"last block is missing, at byte {len(good) - 1}")
+        events.write_bytes(good[:5000] + b"#" + good[5001:])
+        self.expect(redag("check-trace", out), 2, "events.redag: error: byte ", "the checksum of the block does not match")
+        events.write_bytes(good.replace(b"\r\n", b"\n", 1))
+        self.expect(redag("check-trace", out), 2, "the file was copied as text")
+        events.write_bytes(b"")
+        self.expect(redag("check-trace", out), 2, "the file is empty")
+
+    def test_mistakes(self):
+        out = self.results("out")
+        self.expect(redag("events", out, "--format", "perfetto"), 2, "name a file with -o")
+        self.expect(redag("events", out, "--format", "redag", "-o", self.folder / "x.bin"), 2, "*.redag")
+        self.expect(redag("events", out, "-o", "/dev/null"), 2, "/dev/null: error: cannot write: it is not a file")
+        self.expect(redag("events", out, "-o", "/nowhere/x.jsonl"), 2, "/nowhere/x.jsonl")
+        self.results("other")
+        self.expect(redag("events", self.folder), 2, "holds 2 runs")
+
+    def test_a_reader_that_leaves(self):
+        out = self.results("out", duration="300s")
+        command = f"'{PROGRAM}' events '{out}' | head -n 1 | cut -c 1-28; echo ${{PIPESTATUS[0]}}"
+        result = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
+        self.assertEqual(result.stdout, '{"format":"redag.events/1","\n0\n', result.stderr)
 
 
 class Report(Case):
@@ -181,9 +368,9 @@ class Report(Case):
 
     def test_mistakes(self):
         self.expect(redag("report"), 2, "DIR")
-        self.expect(redag("report", self.folder), 2, "no events.jsonl", "--out")
+        self.expect(redag("report", self.folder), 2, "no events.redag", "--out")
         self.expect(redag("report", self.folder / "nowhere"), 2, "nowhere")
-        out = self.results("out")
+        out = self.results("out", "--events", "jsonl")
         self.expect(redag("report", out, "-o", "/nowhere/report.html"), 2, "/nowhere/report.html")
         (out / "comparison.json").write_text("{}")
         self.expect(redag("report", out), 2, "comparison.json:1", "was not written by 'redag compare'")
@@ -195,7 +382,7 @@ class Report(Case):
     def test_repetitions_of_different_things(self):
         self.results("out/repetition-1")
         self.results("out/repetition-2", "--executor", "mte")
-        self.expect(redag("report", self.folder / "out"), 2, "repetition-2/events.jsonl is not a repetition")
+        self.expect(redag("report", self.folder / "out"), 2, "repetition-2/events.redag is not a repetition")
 
 
 class Tune(Case):

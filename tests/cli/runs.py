@@ -16,6 +16,7 @@ import signal
 import subprocess
 import time
 
+from pftrace import Picture
 from program import CART, PROGRAM, SOURCE, Case, body, in_terminal, interrupt, main, redag
 
 
@@ -103,10 +104,12 @@ class Simulate(Case):
         written = json.loads((out / "summary.json").read_text())
         self.assertEqual(written, {key: document[key] for key in written})
         self.assertEqual(sorted(path.name for path in out.iterdir()),
-                         ["events.jsonl", "jobs.csv", "summary.json", "trace.json"])
+                         ["events.redag", "jobs.csv", "summary.json", "trace.pftrace"])
         with open(out / "jobs.csv", newline="") as file:
             self.assertEqual(len(list(csv.DictReader(file))), document["total"]["released"])
-        json.loads((out / "trace.json").read_text())
+        picture = Picture(out / "trace.pftrace")
+        spans = [name for track, kind, name, _ in picture.events if kind == 1 and track in ("sense", "act", "plan")]
+        self.assertEqual(len(spans), document["total"]["released"])
 
     def test_same_seed_same_bytes(self):
         arguments = ["simulate", SOURCE / "workloads" / "contention.yaml", "--duration", "1s", "--json"]
@@ -129,10 +132,11 @@ class Simulate(Case):
         self.assertEqual(summary["host"], os.uname().nodename)
         self.assertIn(os.uname().release, summary["kernel"])
         self.assertEqual(summary["calibration"], "none")
-        self.assertEqual(json.loads((out / "trace.json").read_text())["otherData"], summary)
-        self.assertEqual(json.loads((out / "events.jsonl").read_text().splitlines()[0])["provenance"], summary)
+        picture = Picture(out / "trace.pftrace").run
+        self.assertEqual({key: picture[key] for key in summary}, summary)
+        self.assertEqual(json.loads(redag("events", out).stdout.splitlines()[0])["provenance"], summary)
         for file in out.iterdir():
-            self.assertNotIn("s3cr3t", file.read_text())
+            self.assertNotIn(b"s3cr3t", file.read_bytes())
 
     def test_a_bad_source_date_epoch_is_an_error(self):
         self.expect(redag("simulate", self.cart, env={**os.environ, "SOURCE_DATE_EPOCH": "today"}), 2, "SOURCE_DATE_EPOCH 'today'")
@@ -160,7 +164,7 @@ class Simulate(Case):
         self.assertIn("--max-events", result.stdout)
         self.expect(redag("check-trace", out), 0)
         self.assertGreater(json.loads((out / "summary.json").read_text())["end_ns"],
-                           json.loads((out / "events.jsonl").read_text().splitlines()[-1])["end_ns"])
+                           json.loads(redag("events", out).stdout.splitlines()[-1])["end_ns"])
 
     def test_folders_of_others_are_left_alone(self):
         (self.folder / "mine").mkdir()
@@ -325,12 +329,11 @@ class Killed(Case):
         self.assertTrue(document["check"]["ok"])
         result = self.expect(redag("recover", out), 0)
         self.assertIn("trace check: ok", result.stdout)
-        names = ["events.jsonl", "jobs.csv", "summary.json", "trace.json"]
+        names = ["events.redag", "jobs.csv", "summary.json", "trace.pftrace"]
         for folder in out, elsewhere:
             self.assertEqual(sorted(path.name for path in folder.iterdir()), names)
         self.expect(redag("check-trace", out), 0)
-        self.assertEqual((out / "events.jsonl").read_text().splitlines()[1:],
-                         (elsewhere / "events.jsonl").read_text().splitlines()[1:])
+        self.assertEqual(redag("events", out).stdout.splitlines()[1:], redag("events", elsewhere).stdout.splitlines()[1:])
         self.expect(redag("recover", out), 2, "no record of a run")
 
     def test_a_record_is_given_up_by_force(self):
@@ -356,7 +359,7 @@ class Compare(Case):
         self.assertEqual([executor["name"] for executor in document["executors"]], ["redag", "mte", "ste"])
         for executor in document["executors"]:
             self.assertEqual(executor["repetitions"], 2)
-            self.assertTrue((out / executor["name"] / "repetition-2" / "events.jsonl").exists())
+            self.assertTrue((out / executor["name"] / "repetition-2" / "events.redag").exists())
             runs = [json.loads((out / executor["name"] / f"repetition-{i}" / "summary.json").read_text()) for i in (1, 2)]
             for d, dag in enumerate(executor["dags"]):
                 self.assertEqual(dag["end_to_end_max_ns"],

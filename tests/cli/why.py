@@ -133,6 +133,8 @@ class Why(Case):
         self.assertGreater(named[0]["jobs"], 0)
         # A record of another run is not used.
         events = self.folder / "result" / "events.jsonl"
+        self.expect(redag("events", events.parent, "-o", events), 0)
+        (events.parent / "events.redag").unlink()
         first, rest = events.read_text().split("\n", 1)
         header = json.loads(first)
         header["run" if "provenance" not in header else "provenance"]["command"] = "another"

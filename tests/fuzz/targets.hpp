@@ -17,6 +17,8 @@ void workload_target(std::string_view input);
 void plan_target(std::string_view input);
 /// Reads events.jsonl, and makes everything that is made of a trace: checks, summary, jobs.csv, Perfetto, report.
 void trace_target(std::string_view input);
+/// Reads events.redag.
+void events_target(std::string_view input);
 /// Reads kernel.jsonl.
 void kernel_record_target(std::string_view input);
 /// Reads jobs.csv.
@@ -40,17 +42,12 @@ struct Target {
 };
 
 inline constexpr std::array kTargets = {
-    Target{"workload", workload_target},
-    Target{"plan", plan_target},
-    Target{"trace", trace_target},
-    Target{"jobs_csv", jobs_csv_target},
-    Target{"comparison", comparison_target},
-    Target{"units", units_target},
-    Target{"live_page", live_page_target},
-    Target{"values", values_target},
-    Target{"commands", commands_target},
-    Target{"flight", flight_target},
-    Target{"kernel_record", kernel_record_target},
+    Target{"workload", workload_target}, Target{"plan", plan_target},
+    Target{"trace", trace_target},       Target{"events", events_target},
+    Target{"jobs_csv", jobs_csv_target}, Target{"comparison", comparison_target},
+    Target{"units", units_target},       Target{"live_page", live_page_target},
+    Target{"values", values_target},     Target{"commands", commands_target},
+    Target{"flight", flight_target},     Target{"kernel_record", kernel_record_target},
 };
 
 }  // namespace redag::fuzz

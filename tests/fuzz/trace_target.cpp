@@ -38,7 +38,7 @@ void trace_target(std::string_view input) {
   const std::string &folder = scratch_folder();
   const auto jobs = metrics::fold_jobs(trace->info.workload, trace->events);
   REDAG_CHECK(metrics::write_jobs_csv(folder + "/jobs.csv", trace->info.workload, jobs).has_value(), "jobs.csv");
-  REDAG_CHECK(metrics::write_perfetto(folder + "/trace.json", *trace).has_value(), "trace.json");
+  REDAG_CHECK(metrics::write_perfetto(folder + "/trace.pftrace", *trace).has_value(), "trace.pftrace");
   std::vector<report::Group> groups;
   groups.emplace_back("fuzz", report::digest_options(1));
   groups.back().add(folder, *trace);

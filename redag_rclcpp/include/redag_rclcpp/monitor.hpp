@@ -26,7 +26,7 @@ namespace redag_rclcpp {
 struct MonitorOptions {
   std::chrono::nanoseconds period = std::chrono::seconds(1);  // between two published snapshots; 0: only on request
 
-  /// Folder for events.jsonl, jobs.csv, summary.json, trace.json and metrics.json; created if missing. "": no files.
+  /// Folder for events.jsonl, jobs.csv, summary.json, trace.pftrace and metrics.json; created if missing. "": no files.
   /// Needs ReDAGOptions::trace_capacity.
   std::string trace{};
   std::size_t trace_events = 10'000'000;  // number of first events that are kept, at 32 bytes each

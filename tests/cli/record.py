@@ -1,0 +1,54 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: The ReDAG-RT developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Tests what the program makes of the record of a C++ program (ExecutorOptions::record): examples/07_record.
+
+Usage: record.py PROGRAM SOURCE_DIR. Uses the standard library only.
+"""
+import json
+import signal
+import subprocess
+import time
+
+from program import PROGRAM, Case, main, redag
+
+EXAMPLE = PROGRAM.parent.parent / "examples" / "example_07_record"
+
+
+class Record(Case):
+    def record(self, folder):
+        return subprocess.run([EXAMPLE, folder], capture_output=True, text=True, timeout=100, check=False)
+
+    def test_the_tools_read_a_record(self):
+        folder = self.folder / "deep" / "robot"
+        self.expect(self.record(folder), 0)
+        self.assertEqual([path.name for path in folder.iterdir()], ["events.jsonl"])
+        self.assertIn("control.pid", self.expect(redag("why", folder), 0).stdout)
+        checked = json.loads(self.expect(redag("check-trace", "--json", folder), 0).stdout)
+        self.assertTrue(checked, "the checker finds nothing wrong, and says so")
+        self.expect(redag("report", folder), 0)
+        report = (folder / "report.html").read_text(encoding="utf-8")
+        self.assertIn("control.pid", report)
+
+    def test_a_killed_program_leaves_a_record(self):
+        folder = self.folder / "robot"
+        with subprocess.Popen([EXAMPLE, folder], stdout=subprocess.DEVNULL) as process:
+            events = folder / "flight" / "events.bin"
+            while process.poll() is None and not (events.exists() and events.stat().st_size > 0):
+                time.sleep(0.01)
+            process.send_signal(signal.SIGKILL)
+        self.assertEqual(process.returncode, -signal.SIGKILL)
+        self.expect(redag("recover", folder), 0)
+        self.expect(redag("check-trace", folder), 0)
+        self.assertIn("control.pid", self.expect(redag("why", folder), 0).stdout)
+
+    def test_a_folder_that_cannot_be_written_is_named(self):
+        (self.folder / "file").write_text("")
+        result = self.record(self.folder / "file")
+        self.assertEqual(result.returncode, 2)
+        self.assertIn(f"{self.folder / 'file'}: error: cannot create the folder of the record", result.stderr)
+
+
+if __name__ == "__main__":
+    main()

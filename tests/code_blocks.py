@@ -1,0 +1,218 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: The ReDAG-RT developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Executes the code blocks of README.md, docs/*.md and docs/tutorials/*.md, as a reader would.
+
+Usage: code_blocks.py PROGRAM SOURCE_DIR BUILD_DIR CXX CMAKE [PAGE...]
+
+The blocks of a page run in order in one new folder, which has the repository's workloads and experiments. The program
+is in PATH, and the build is installed where CMake and pkg-config find it. By language:
+
+    sh        runs, and every command has to succeed
+    console   lines that begin with "$ " run, and print what follows them, if anything does; "..." is any text
+    cpp       compiles; a part of a program, inside main(); with ROS 2, where it is installed
+    yaml      is a valid workload, plan or file of overheads
+    cmake     is for a file; the page's commands use it
+    xml       is well-formed
+    diff, sql, text and blocks without a language are no code
+
+A comment before a block changes that. "not run" blocks are counted, with their reasons, and sh is still parsed:
+
+    <!-- not run: REASON -->
+    <!-- run with: TEXT = OTHER -->          another text in the place of one, for example a shorter time
+    <!-- compiled with: DECLARATIONS -->     what a part of a program needs
+    <!-- file: NAME -->                      the block is also the content of a file
+"""
+import collections
+import os
+import pathlib
+import re
+import shlex
+import subprocess
+import sys
+import tempfile
+import time
+import xml.etree.ElementTree
+
+MARKS = ("not run", "run with", "compiled with", "file")
+# The README is the front page and has no marks. By a text of the block.
+README = {
+    "make demo": ("not run", "builds everything; .ci/run executes the targets"),
+    "git clone <this repository>": ("not run", "needs ROS 2; tools/test_documented_build runs it"),
+    "redag_rclcpp::ReDAGExecutor executor;": ("compiled with", "struct Robot : rclcpp::Node { Robot() : Node(\"robot\") {} };"),
+    "read_imu()": ("compiled with", "void read_imu(); void actuate();"),
+}
+NO_CODE = {"", "text", "diff", "sql"}
+PATIENCE = 300  # s for one block
+
+Block = collections.namedtuple("Block", "page line language text marks")
+
+
+class Wrong(Exception):
+    """What is wrong with a block."""
+
+
+def blocks_of(page, source):
+    lines = (source / page).read_text(encoding="utf-8").splitlines()
+    found, marks, at = [], {}, 0
+    while at < len(lines):
+        mark = re.fullmatch(r"\s*<!-- ([a-z ]+): (.+) -->", lines[at])
+        fence = re.fullmatch(r"(\s*)```(\w*)", lines[at])
+        if mark and mark[1] in MARKS:
+            marks[mark[1]] = "\n".join(filter(None, [marks.get(mark[1]), mark[2]]))
+        elif fence:
+            end = next(n for n in range(at + 1, len(lines)) if lines[n] == fence[1] + "```")
+            text = "".join(line.removeprefix(fence[1]) + "\n" for line in lines[at + 1:end])
+            if page == "README.md":
+                marks.update([mark for part, mark in README.items() if part in text])
+            found.append(Block(page, at + 1, fence[2], text, marks))
+            marks, at = {}, end
+        elif lines[at].strip():
+            if marks:
+                raise Wrong(f"{page}:{at + 1}: the comment before this line belongs to no block")
+        at += 1
+    return found
+
+
+class Page:
+    """Executes the blocks of one page in a folder of its own."""
+
+    def __init__(self, folder, tools, source):
+        self.folder, self.tools = folder, tools
+        for name in "workloads", "experiments", "examples":
+            (folder / name).symlink_to(source / name)
+        path = os.pathsep.join([str(tools.bin), str(tools.program.parent), os.environ["PATH"]])
+        self.environment = {**os.environ, "PATH": path, "CMAKE_PREFIX_PATH": str(tools.prefix), "CXX": tools.cxx,
+                            "PKG_CONFIG_PATH": str(tools.pkgconfig), "NO_COLOR": "1", "HOME": str(folder)}
+        # A library that is found there at run time, as an installed one is.
+        self.environment["LD_LIBRARY_PATH"] = str(tools.pkgconfig.parent)
+
+    def call(self, command, text=None, arguments=()):
+        result = subprocess.run(["bash", "-euo", "pipefail", "-c", command, "bash", *arguments], cwd=self.folder, text=True,
+                                input=text, env=self.environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                                timeout=PATIENCE, check=False)
+        if result.returncode != 0:
+            raise Wrong(f"status {result.returncode} of: {command}\n{result.stdout[-3000:]}")
+        return result.stdout
+
+    def sh(self, block):
+        self.call(block.text)
+
+    def console(self, block):
+        for part in re.split(r"(?m)^\$ ", block.text)[1:]:
+            command, expected = part.split("\n", 1)
+            said = self.call(command)
+            pattern = re.escape(expected.strip()).replace(r"\.\.\.", ".*")
+            if expected.strip() and not re.fullmatch(pattern, said.strip(), re.S):
+                raise Wrong(f"$ {command}\nprints\n{said}\nand not\n{expected}")
+
+    def cpp(self, block):
+        text = block.text
+        if not re.search(r"\bmain\(", text):
+            body = re.sub(r"(?m)^(?:#include .*|using .*;)$", "", text)
+            text = "\n".join([*re.findall(r"(?m)^(?:#include .*|using .*;)$", text), "int main() {", body, "}\n"])
+        text = re.sub(r"(?m)^int main\(", lambda main: block.marks.get("compiled with", "") + "\n" + main[0], text)
+        if "rclcpp" in text:
+            text = "#include <rclcpp/rclcpp.hpp>\n" + text
+        self.call(f"{self.tools.cxx} -std=c++20 -x c++ -fsyntax-only -Wall -Wextra -Werror -Wno-unused-variable "
+                  f"$(pkg-config --cflags redag) {' '.join(self.tools.ros)} -", text)
+
+    def yaml(self, block):
+        name = block.marks.get("file", f"line{block.line}.yaml")
+        (self.folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (self.folder / name).write_text(block.text, encoding="utf-8")
+        quoted = shlex.quote(name)
+        if re.search(r"(?m)^experiment: ", block.text):
+            self.call(f"redag experiment cost {quoted} --sample 10ms")
+        elif re.search(r"(?m)^overheads:", block.text):
+            self.call(f"redag analyze workloads/robot.yaml --overheads {quoted}")
+        else:
+            self.call(f"redag validate {quoted}")
+
+    def cmake(self, block):
+        if "file" not in block.marks:
+            raise Wrong("a block of CMake is for a file: <!-- file: CMakeLists.txt -->")
+
+    def xml(self, block):
+        xml.etree.ElementTree.fromstring(block.text)
+
+    def execute(self, block):
+        """Returns what was done with the block."""
+        if block.language in NO_CODE:
+            return "no code"
+        if block.language not in ("sh", "console", "cpp", "yaml", "cmake", "xml"):
+            raise Wrong(f"no rule for the language {block.language!r}")
+        if "not run" in block.marks:
+            if block.language == "sh":
+                self.call('bash -n <<< "$1"', arguments=[block.text.replace("<this repository>", "repository")])
+            return "not run"
+        if block.language == "cpp" and "rclcpp" in block.text and not self.tools.ros:
+            block.marks["not run"] = "there is no ROS 2 under /opt/ros"
+            return "not run"
+        if "run with" in block.marks:
+            old, new = block.marks["run with"].split(" = ")
+            if old not in block.text:
+                raise Wrong(f"'run with' names {old!r}, which is not in the block")
+            block = block._replace(text=block.text.replace(old, new))
+        if "file" in block.marks:
+            (self.folder / block.marks["file"]).parent.mkdir(parents=True, exist_ok=True)
+            (self.folder / block.marks["file"]).write_text(block.text, encoding="utf-8")
+        getattr(self, block.language)(block)
+        return {"sh": "executed", "console": "executed", "cpp": "compiled"}.get(block.language, "validated")
+
+
+class Tools:
+    """The program, and an installation of the build."""
+
+    def __init__(self, program, source, build, cxx, cmake, scratch):
+        self.program, self.cxx, self.prefix = program, cxx, scratch / "prefix"
+        subprocess.run([cmake, "--install", build, "--prefix", self.prefix], check=True, stdout=subprocess.DEVNULL)
+        self.pkgconfig = next(self.prefix.rglob("redag.pc")).parent
+        # Headers of ROS 2, which the compiler takes as the system's, and of this repository's package for it.
+        newest = sorted(pathlib.Path("/opt/ros").glob("*/include/rclcpp/rclcpp"))[-1:]
+        self.ros = [f"-isystem {folder}" for place in newest for folder in place.parents[1].iterdir()]
+        if self.ros:
+            self.ros += [f"-I{source / 'redag_rclcpp' / 'include'}", f"-I{self.prefix / 'include' / 'redag-internal'}"]
+        self.bin = scratch / "bin"
+        self.bin.mkdir()
+        # A static library, which only this build installs, needs what it is built on.
+        if not list(self.pkgconfig.parent.glob("libredag.so*")):
+            wrapper = self.bin / "pkg-config"
+            wrapper.write_text('#!/bin/sh\nPATH=${PATH#*:} exec pkg-config --static "$@"\n')
+            wrapper.chmod(0o755)
+
+
+def main():
+    if len(sys.argv) < 6:
+        sys.exit(__doc__)
+    program, source, build = (pathlib.Path(argument).resolve() for argument in sys.argv[1:4])
+    pages = sys.argv[6:] or ["README.md", *(str(page.relative_to(source)) for page in
+                                            sorted([*source.glob("docs/*.md"), *source.glob("docs/tutorials/*.md")]))]
+    counts, reasons, failures = collections.Counter(), [], 0
+    with tempfile.TemporaryDirectory() as name:
+        tools = Tools(program, source, build, *sys.argv[4:6], pathlib.Path(name))
+        for number, page in enumerate(pages):
+            folder = pathlib.Path(name, f"page{number}")
+            folder.mkdir()
+            runner = Page(folder, tools, source)
+            begin = time.monotonic()
+            for block in blocks_of(page, source):
+                try:
+                    done = runner.execute(block)
+                except (Wrong, OSError, ValueError, subprocess.TimeoutExpired, xml.etree.ElementTree.ParseError) as error:
+                    print(f"{page}:{block.line}: {error}", flush=True)
+                    failures += 1
+                    continue
+                counts[done] += 1
+                if done == "not run":
+                    reasons.append(f"{page}:{block.line}: {block.marks['not run']}")
+            print(f"{page}: {time.monotonic() - begin:.1f} s", flush=True)
+    print("Not run:", *reasons, sep="\n  ")
+    print(", ".join(f"{count} {done}" for done, count in sorted(counts.items())), f"and {failures} failed")
+    if failures or not sys.argv[6:] and counts["executed"] < 10:
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    main()
