@@ -7,6 +7,7 @@
 #include <chrono>
 #include <utility>
 
+#include "redag/base/lock_guard.hpp"
 #include "redag/runtime/clock.hpp"
 #include "redag_lab/cli/top/live_json.hpp"
 
@@ -17,7 +18,7 @@ LiveState::LiveState(std::vector<live::Listed> pages, Time now)
 
 std::shared_ptr<const std::string> LiveState::document(const live::Listed *shown) {
   const std::size_t place = shown == nullptr ? pages_.size() : static_cast<std::size_t>(shown - pages_.data());
-  const std::lock_guard guard(lock_);
+  const LockGuard guard(lock_);
   if (documents_[place] == nullptr) {
     const Json document = {{"list", to_json(pages_, now_)},
                            {"frame", shown == nullptr ? Json(nullptr) : to_json(*shown, *shown->page, now_)}};
@@ -35,28 +36,31 @@ LiveFeed::~LiveFeed() {
 }
 
 void LiveFeed::stop() {
-  const std::lock_guard guard(lock_);
+  const LockGuard guard(lock_);
   stopped_ = true;
   changed_.notify_all();
 }
 
 void LiveFeed::main() {
-  std::unique_lock lock(lock_);
-  while (!stopped_) {
-    changed_.wait(lock, [this] { return stopped_ || watchers_ > 0; });
-    if (stopped_) break;
-    lock.unlock();
+  for (;;) {
+    {
+      const LockGuard guard(lock_);
+      while (!stopped_ && watchers_ == 0) changed_.wait(lock_);
+      if (stopped_) return;
+    }
     auto state = std::make_shared<LiveState>(live::list_pages(folder_), runtime::monotonic_now());
-    lock.lock();
+    const LockGuard guard(lock_);
     state_ = std::move(state);
     ++number_;
     changed_.notify_all();
-    changed_.wait_for(lock, std::chrono::nanoseconds(interval_), [this] { return stopped_; });
+    const auto until = std::chrono::steady_clock::now() + std::chrono::nanoseconds(interval_);
+    while (!stopped_ && changed_.wait_until(lock_, until) == std::cv_status::no_timeout) {
+    }
   }
 }
 
 std::unique_ptr<LiveFeed::Watcher> LiveFeed::watch(std::optional<LiveTarget> target) {
-  const std::lock_guard guard(lock_);
+  const LockGuard guard(lock_);
   if (stopped_ || watchers_ >= most_watchers_) return nullptr;
   // A state that nobody watched is old: the first watcher waits for a new one.
   auto watcher = std::make_unique<Watcher>(*this, target, watchers_ == 0 ? number_ : 0);
@@ -66,15 +70,15 @@ std::unique_ptr<LiveFeed::Watcher> LiveFeed::watch(std::optional<LiveTarget> tar
 }
 
 LiveFeed::Watcher::~Watcher() {
-  const std::lock_guard guard(feed_.lock_);
+  const LockGuard guard(feed_.lock_);
   --feed_.watchers_;
 }
 
 std::shared_ptr<const std::string> LiveFeed::Watcher::next() {
   std::shared_ptr<LiveState> state;
   {
-    std::unique_lock lock(feed_.lock_);
-    feed_.changed_.wait(lock, [this] { return feed_.stopped_ || feed_.number_ > seen_; });
+    const LockGuard guard(feed_.lock_);
+    while (!feed_.stopped_ && feed_.number_ <= seen_) feed_.changed_.wait(feed_.lock_);
     if (feed_.stopped_) return nullptr;
     seen_ = feed_.number_;
     state = feed_.state_;

@@ -10,12 +10,13 @@
 #include <condition_variable>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "redag/base/mutex.hpp"
+#include "redag/base/thread_annotations.hpp"
 #include "redag/base/time.hpp"
 #include "redag/live/reader.hpp"
 #include "redag_lab/cli/top/attachment.hpp"
@@ -34,9 +35,9 @@ class LiveState {
  private:
   const std::vector<live::Listed> pages_;
   const Time now_;
-  std::mutex lock_;
-  std::vector<std::shared_ptr<const std::string>>
-      documents_;  // by page, then that without a frame; null: not asked for
+  Mutex lock_;
+  std::vector<std::shared_ptr<const std::string>> documents_
+      REDAG_GUARDED_BY(lock_);  // by page, then that without a frame; null: not asked for
 };
 
 class LiveFeed {
@@ -78,12 +79,12 @@ class LiveFeed {
   const std::string folder_;
   const Duration interval_;
   const unsigned most_watchers_;
-  std::mutex lock_;
-  std::condition_variable changed_;
-  std::shared_ptr<LiveState> state_;
-  std::uint64_t number_ = 0;  // of the state
-  unsigned watchers_ = 0;
-  bool stopped_ = false;
+  Mutex lock_;
+  std::condition_variable_any changed_;
+  std::shared_ptr<LiveState> state_ REDAG_GUARDED_BY(lock_);
+  std::uint64_t number_ REDAG_GUARDED_BY(lock_) = 0;  // of the state
+  unsigned watchers_ REDAG_GUARDED_BY(lock_) = 0;
+  bool stopped_ REDAG_GUARDED_BY(lock_) = false;
   std::thread thread_;
 };
 
