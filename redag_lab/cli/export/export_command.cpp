@@ -3,15 +3,13 @@
 
 #include <fmt/format.h>
 
-#include <filesystem>
 #include <memory>
 #include <string>
-#include <system_error>
 
-#include "redag/base/text.hpp"
 #include "redag/live/writer.hpp"
 #include "redag_lab/cli/export/prometheus_exporter.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
+#include "redag_lab/cli/terminal/options.hpp"
 #include "redag_lab/cli/terminal/signals.hpp"
 
 namespace redag::cli {
@@ -68,15 +66,7 @@ Action add_export(CLI::App &app) {
   app.add_flag("--once", options->once, "Print the figures once in Prometheus's text format, and exit")
       ->needs(prometheus)
       ->excludes(listen);
-  app.add_option("--folder", options->folder, "Folder of the live pages")
-      ->check([](const std::string &folder) {
-        std::error_code ignored;
-        const bool there = folder == live::kFolder || std::filesystem::is_directory(folder, ignored);
-        return there ? std::string() : in_quotes(folder) + " is not a folder";
-      })
-      ->type_name("DIR")
-      ->capture_default_str()
-      ->needs(prometheus);
+  add_pages_folder(app, options->folder)->needs(prometheus);
   return [options](Console &console) {
     if (!options->prometheus) {
       console.error("nothing to export to is named", "add --prometheus");

@@ -4,11 +4,9 @@
 #include <fmt/format.h>
 
 #include <chrono>
-#include <filesystem>
 #include <memory>
 #include <thread>
 
-#include "redag/base/text.hpp"
 #include "redag/live/writer.hpp"
 #include "redag_lab/cli/serve/access.hpp"
 #include "redag_lab/cli/serve/live_server.hpp"
@@ -61,14 +59,7 @@ Action add_serve(CLI::App &app) {
   auto options = std::make_shared<Options>();
   add_count(app, "--port", options->port, Range<std::uint32_t>{0, 65535}, "Port on 127.0.0.1; 0: a free one");
   add_duration(app, "--interval", options->interval, "Time between two updates");
-  app.add_option("--folder", options->folder, "Folder of the live pages")
-      ->type_name("DIR")
-      ->capture_default_str()
-      ->check([](const std::string &folder) {
-        std::error_code ignored;
-        const bool there = folder == live::kFolder || std::filesystem::is_directory(folder, ignored);
-        return there ? std::string() : in_quotes(folder) + " is not a folder";
-      });
+  add_pages_folder(app, options->folder);
   return [options](Console &console) { return serve(*options, console); };
 }
 

@@ -8,9 +8,14 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <stdexcept>
+#include <system_error>
 #include <type_traits>
+
+#include "redag/base/text.hpp"
+#include "redag/live/writer.hpp"
 
 namespace redag::cli {
 namespace {
@@ -118,6 +123,17 @@ const Choices<PreemptionMode> &preemption_choices() {
   static const Choices<PreemptionMode> kChoices = choices_of(
       std::array{PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Os, PreemptionMode::Auto});
   return kChoices;
+}
+
+CLI::Option *add_pages_folder(CLI::App &app, std::string &folder) {
+  return app.add_option("--folder", folder, "Folder of the live pages")
+      ->type_name("DIR")
+      ->capture_default_str()
+      ->check([](const std::string &given) {
+        std::error_code ignored;
+        const bool there = given == live::kFolder || std::filesystem::is_directory(given, ignored);
+        return there ? std::string() : in_quotes(given) + " is not a folder";
+      });
 }
 
 }  // namespace redag::cli

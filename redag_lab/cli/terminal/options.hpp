@@ -100,4 +100,7 @@ CLI::Option *add_choice(CLI::App &app, const std::string &name, Target &target, 
 [[nodiscard]] const Choices<Ties> &ties_choices();
 [[nodiscard]] const Choices<PreemptionMode> &preemption_choices();
 
+/// --folder, where live pages are: live::kFolder or any folder.
+CLI::Option *add_pages_folder(CLI::App &app, std::string &folder);
+
 }  // namespace redag::cli

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <memory>
 #include <optional>
 
@@ -131,14 +130,7 @@ Action add_top(CLI::App &app) {
   app.add_flag("--dags", view.dags_only, "Show only DAGs, not their tasks");
   app.add_flag("--since-start", view.since_start, "Show figures since the start instead of over the last seconds");
   app.add_flag("--ascii", options->ascii, "Draw graphs with ASCII characters");
-  app.add_option("--folder", options->folder, "Folder of the live pages")
-      ->type_name("DIR")
-      ->capture_default_str()
-      ->check([](const std::string &folder) {
-        std::error_code ignored;
-        const bool there = folder == live::kFolder || std::filesystem::is_directory(folder, ignored);
-        return there ? std::string() : in_quotes(folder) + " is not a folder";
-      });
+  add_pages_folder(app, options->folder);
   return [options](Console &console) { return top(*options, console); };
 }
 
