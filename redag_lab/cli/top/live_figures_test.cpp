@@ -82,7 +82,8 @@ TEST(LiveFigures, SayThatNobodyWrites) {
 }
 
 TEST(LiveFigures, RatesAreOfTheWindowOrOfAll) {
-  const live::Frame &frame = small_page().page->frame;
+  const live::Listed listed = small_page();
+  const live::Frame &frame = listed.page->frame;
   EXPECT_EQ(rate_of(frame.tasks[0].figures, frame, false), 10);  // 20 jobs in 2 s
   EXPECT_EQ(rate_of(frame.tasks[0].figures, frame, true), 10);   // 100 jobs in 10 s
   EXPECT_DOUBLE_EQ(cpu_of(frame.tasks[0].figures, frame, false), 0.05);
