@@ -152,6 +152,8 @@ class Examples(Case):
             return "no right to use SCHED_FIFO"
         if "--affinity" in example and len(os.sched_getaffinity(0)) < 2:
             return "two processors are needed"
+        if "--prometheus" in example and "without Prometheus" in redag("export", "--prometheus", "--once").stderr:
+            return "this redag was built without Prometheus"
         for tool in ("jq", "man", "script"):
             if re.search(rf"(?:\| |^){tool} ", example) and not shutil.which(tool):
                 return f"{tool} is not installed"
