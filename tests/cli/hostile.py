@@ -31,12 +31,14 @@ BAD = {
 }
 FREE = {("experiment acceptance", "--name")}  # accepts any name
 SEED = "--seed"
+# A sanitized program takes a second to start, and the options share their code: some of them will do there.
+STEP = 4 if SANITIZED else 1
 
 
 def options_of(command):
     """Returns (name, type) of every option that takes a value."""
     text = redag(*command, "--help").stdout.split("Examples:")[0]
-    return re.findall(r"^ +(?:-\w,)?(--[\w-]+) ([A-Zi][\w/.,-]*)(?=[ \n=])", text, re.MULTILINE)
+    return re.findall(r"^ +(?:-\w,)?(--[\w-]+) ([A-Zi][\w/.,-]*)(?=[ \n=])", text, re.MULTILINE)[::STEP]
 
 
 class EveryOption(Case):
@@ -61,7 +63,7 @@ class EveryOption(Case):
             for option, _ in options_of(command):
                 self.assertIn(option, self.refuse(command, option, ""), (command, option))
                 tried += 1
-        self.assertGreater(tried, 100)
+        self.assertGreater(tried, 100 / STEP)
 
     def test_bad_values(self):
         tried = 0
@@ -69,12 +71,12 @@ class EveryOption(Case):
             for option, kind in options_of(command):
                 if (" ".join(command), option) in FREE:
                     continue
-                for value in BAD.get(kind, [])[: 1 if SANITIZED else None]:
+                for value in BAD.get(kind, []):
                     said = self.refuse(command, option, value)
                     if option not in ("--executor", "--run-workload"):
                         self.assertIn(option, said, (command, option, value))
                     tried += 1
-        self.assertGreater(tried, 100 if SANITIZED else 400)
+        self.assertGreater(tried, 400 / STEP)
 
     def test_limits_are_said(self):
         """Every number has a range, which the message states."""
@@ -87,7 +89,7 @@ class EveryOption(Case):
     def test_flags_take_no_value(self):
         for command in COMMANDS:
             text = redag(*command, "--help").stdout.split("Examples:")[0]
-            for flag in re.findall(r"^ +(--[\w-]+)  ", text, re.MULTILINE):
+            for flag in re.findall(r"^ +(--[\w-]+)  ", text, re.MULTILINE)[::STEP]:
                 if flag not in ("--help", "--version"):
                     self.assertIn(f"{flag} takes no value", self.refuse(command, flag, "maybe"), command)
 
