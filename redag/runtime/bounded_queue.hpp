@@ -9,6 +9,7 @@
 #pragma once
 
 #include <atomic>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -28,7 +29,7 @@ class BoundedQueue {
   struct alignas(kCacheLine) End {
     Atomic<std::uint64_t> place{0};
     std::uint64_t other = 0;
-    bool taken = false;
+    std::atomic<bool> taken{false};
   };
 
  public:
@@ -95,7 +96,7 @@ class BoundedQueue {
 
  private:
   static void take(End &end, const char *refusal) {
-    if (std::exchange(end.taken, true)) throw std::logic_error(refusal);
+    if (end.taken.exchange(true)) throw std::logic_error(refusal);
   }
 
   template <class Value>

@@ -11,6 +11,7 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -33,7 +34,7 @@ class LatestValue {
     Writer(const Writer &) = delete;
     Writer &operator=(const Writer &) = delete;
     ~Writer() {
-      if (of_ != nullptr) of_->has_writer_ = false;
+      if (of_ != nullptr) of_->has_writer_.store(false);
     }
 
     void write(T value) { of_->write(std::move(value)); }
@@ -52,7 +53,7 @@ class LatestValue {
     Reader(const Reader &) = delete;
     Reader &operator=(const Reader &) = delete;
     ~Reader() {
-      if (of_ != nullptr) of_->has_reader_[index_] = false;
+      if (of_ != nullptr) of_->has_reader_[index_].store(false);
     }
 
     /// The latest value. The reference is valid, and what it refers to unchanged, until this reader reads again.
@@ -82,7 +83,7 @@ class LatestValue {
   /// Throws std::logic_error while the register has a writer. Take writer and readers before the threads that use them
   /// start.
   [[nodiscard]] Writer writer() {
-    if (std::exchange(has_writer_, true)) {
+    if (has_writer_.exchange(true)) {
       throw std::logic_error("LatestValue::writer(): the register has a writer already, and allows only one");
     }
     return Writer(this);
@@ -90,9 +91,7 @@ class LatestValue {
   /// Throws std::logic_error while the register has as many readers as its constructor was told.
   [[nodiscard]] Reader reader() {
     for (std::size_t i = 0; i < has_reader_.size(); ++i) {
-      if (has_reader_[i]) continue;
-      has_reader_[i] = true;
-      return Reader(this, i);
+      if (!has_reader_[i].exchange(true)) return Reader(this, i);
     }
     throw std::logic_error(
         "LatestValue::reader(): the register has all its readers already (pass their number to its constructor)");
@@ -144,8 +143,9 @@ class LatestValue {
   std::vector<bool> spared_;  // the writer's
   Atomic<std::uint32_t> latest_{0};
   std::unique_ptr<Atomic<std::uint32_t>[]> reading_;
-  std::vector<bool> has_reader_;
-  bool has_writer_ = false;
+  // The two ends may be given back by the threads that used them. No value depends on the order of these.
+  std::vector<std::atomic<bool>> has_reader_;
+  std::atomic<bool> has_writer_{false};
 };
 
 }  // namespace redag::runtime

@@ -38,8 +38,9 @@ Result<InputFile> InputFile::open(const std::string &path) {
   if (::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode) && status.st_size > 0) {
     return InputFile(path, descriptor, static_cast<std::uint64_t>(status.st_size));
   }
+  // A pipe must not be opened twice: its writer may have left in between.
+  Result<std::string> all = read_rest(descriptor, path);
   ::close(descriptor);
-  Result<std::string> all = read_file(path);
   if (!all) return tl::unexpected<Diagnostics>(std::move(all.error()));
   InputFile file(path, -1, all->size());
   file.owned_ = *std::move(all);

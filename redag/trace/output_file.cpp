@@ -118,11 +118,16 @@ Result<void> OutputFile::commit() {
 Result<std::string> read_file(const std::string &path, std::size_t most) {
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (descriptor < 0) return file_error(path, 0, std::string("cannot open: ") + std::strerror(errno));
+  Result<std::string> text = read_rest(descriptor, path, most);
+  ::close(descriptor);
+  return text;
+}
+
+Result<std::string> read_rest(int descriptor, const std::string &path, std::size_t most) {
   std::string text;
   struct stat status {};
   const bool known = ::fstat(descriptor, &status) == 0;
   if (known && S_ISCHR(status.st_mode)) {  // /dev/zero has no end
-    ::close(descriptor);
     return file_error(path, 0, "is a device, not a file");
   }
   if (known && status.st_size > 0) {
@@ -132,18 +137,14 @@ Result<std::string> read_file(const std::string &path, std::size_t most) {
   ssize_t count = 0;
   while ((count = ::read(descriptor, block.data(), block.size())) != 0) {
     if (count > 0 && static_cast<std::size_t>(count) > most - text.size()) {
-      ::close(descriptor);
       return file_error(path, 0, "is longer than " + std::to_string(most >> 20U) + " MiB");
     }
     if (count > 0) {
       text.append(block, 0, static_cast<std::size_t>(count));
     } else if (errno != EINTR) {
-      const int error = errno;
-      ::close(descriptor);
-      return file_error(path, 0, std::string("cannot read: ") + std::strerror(error));
+      return file_error(path, 0, std::string("cannot read: ") + std::strerror(errno));
     }
   }
-  ::close(descriptor);
   return text;
 }
 
