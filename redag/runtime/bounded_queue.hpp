@@ -9,7 +9,6 @@
 #pragma once
 
 #include <atomic>
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
