@@ -598,11 +598,10 @@ TEST(PriorityScheduler, ALimitLooksPastReadyJobsForSuspendedOnes) {
 
 // The job that ended was the least urgent running one. A later job between the two must not be measured against it.
 TEST(PriorityScheduler, AJobThatTakesAPlaceIsItsOwnVictim) {
-  const Workload workload = make_workload({make_dag("chain", {{.name = "a", .period = 10, .priority = 2},
-                                                              {.name = "b", .after = {0}, .priority = 4}}),
-                                           make_dag("others", {{.name = "c", .period = 10, .priority = 1},
-                                                               {.name = "d", .period = 10, .priority = 3}})},
-                                          1, PreemptionMode::Os, PolicyKind::Fixed);
+  const Workload workload = make_workload(
+      {make_dag("chain", {{.name = "a", .period = 10, .priority = 2}, {.name = "b", .after = {0}, .priority = 4}}),
+       make_dag("others", {{.name = "c", .period = 10, .priority = 1}, {.name = "d", .period = 10, .priority = 3}})},
+      1, PreemptionMode::Os, PolicyKind::Fixed);
   PriorityScheduler scheduler(workload, config_of(workload));
   scheduler.release(TaskId(0), 0, 0);
   const JobSlot a = scheduler.dispatch(0).dispatches.front().job;
