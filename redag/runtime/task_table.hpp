@@ -35,8 +35,8 @@ struct TaskEntry {
 
   /// Counts a job that ended, used `used` of processor time and took `took` on the clock.
   void count(Duration used, Duration took) {
-    short_jobs = took <= CpuMeter::kShort ? std::min(short_jobs + 1, kStreak) : 0;
-    tiny_score = took <= kTiny ? std::min(tiny_score + 3, kMostTinyScore) : tiny_score - (tiny_score > 0 ? 1 : 0);
+    const bool as_ever = took <= kTiny && short_jobs == kStreak && tiny_score == kMostTinyScore;
+    if (!as_ever) learn(took);
     ++usage.jobs;
     usage.total += used;
     usage.longest = std::max(usage.longest, used);
@@ -95,6 +95,10 @@ struct TaskEntry {
   bool removed = false;
 
  private:
+  void learn(Duration took) {
+    short_jobs = took <= CpuMeter::kShort ? std::min(short_jobs + 1, kStreak) : 0;
+    tiny_score = took <= kTiny ? std::min(tiny_score + 3, kMostTinyScore) : tiny_score - (tiny_score > 0 ? 1 : 0);
+  }
   [[gnu::noinline]] void count_excess(Duration used) {
     if (wcet > 0 && used > wcet) ++usage.over_wcet;
     if (budget > 0 && used > budget) ++usage.over_budget;
