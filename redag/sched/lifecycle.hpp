@@ -116,6 +116,7 @@ class Lifecycle final : public Scheduler {
                                                                  Time nominal, Time turn);
   [[gnu::always_inline]] inline void prepare(Job &job, const TaskState &task, Time origin);
   [[gnu::always_inline]] inline bool hand_over(std::uint32_t slot, Time now, std::uint32_t most) requires HandsOver<D>;
+  void tell_hand_over(const Job &ended, const Job &next, Time now);
   void skip(std::uint32_t slot, Reason reason);
   template <class Predicate>
   void skip_all(Reason reason, Predicate which);

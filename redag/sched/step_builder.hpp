@@ -82,13 +82,15 @@ class StepBuilder {
   /// From now on, only events of these kinds are kept.
   void record_only(EventKinds kinds) { recorded_ = kinds; }
 
+  [[nodiscard]] bool records(JobEventKind kind) const { return recorded_.contains(kind); }
+
   [[gnu::always_inline]] void emit(const Job &job, JobEventKind kind, std::int64_t value,
                                    Reason reason = Reason::None) {
     emit(job.task, job.number, job.worker, kind, value, reason);
   }
   [[gnu::always_inline]] void emit(TaskId task, std::uint32_t number, WorkerId worker, JobEventKind kind,
                                    std::int64_t value, Reason reason = Reason::None) {
-    if (recorded_.contains(kind)) record(JobEvent{now_, value, task, number, worker.value, kind, reason, 0});
+    if (records(kind)) record(JobEvent{now_, value, task, number, worker.value, kind, reason, 0});
   }
 
   [[gnu::always_inline]] void tell(const Job &job, JobSlot slot, DispatchKind kind, JobSlot over, std::uint32_t level) {
