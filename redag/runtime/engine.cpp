@@ -117,12 +117,7 @@ void Engine::main(WorkerThread &self) noexcept {
     if (self.take_mail()) {
       Taker taker{self, JobSlot(), {Next::Kind::Start, self.mail}};
       self.meter.pass();
-      Time at = now();
-      // A job that was dispatched to this very thread when the last one ended needs no wake-up.
-      while (taker.next.kind == Next::Kind::Start) {
-        if (self.led && !taker.next.assignment.expected_short) follow(self);
-        run(taker, at);
-      }
+      run(taker, now());
     } else if (ending) {
       return;
     }
@@ -339,8 +334,7 @@ bool Engine::run_one() {
   }
   if (taker.next.kind != Next::Kind::Start) return false;
   pool_.caller().meter.forget();
-  Time at = now();
-  run(taker, at);
+  run(taker, now());
   return true;
 }
 

@@ -231,9 +231,11 @@ class Engine {
   void follow(WorkerThread &self) noexcept;
   void guard_throttling() noexcept;
   void look_out() noexcept;
-  void run(Taker &taker, Time &at) noexcept;
+  void run(Taker &taker, Time at) noexcept;
+  Time run_next(Taker &taker, RunningJob &running, Time at, Body &doomed) noexcept;
   sched::Outcome call(const Assignment &assignment);
-  void finish(Taker &taker, RunningJob &running, sched::Outcome outcome, Time &next_begins);
+  Time finish(Taker &taker, RunningJob &running, sched::Outcome outcome, Body &doomed);
+  void count_late(const Job &job, TaskEntry &entry, Time at) REDAG_REQUIRES(lock_);
   void note_misses(Locked &locked, const Job &job, const TaskEntry &entry, Time at, sched::Outcome outcome)
       REDAG_REQUIRES(lock_);
   void preemption_point(RunningJob &job);
@@ -251,7 +253,7 @@ class Engine {
   void register_dag(DagId id, const Dag &dag, std::span<const TaskId> ids, std::span<Body> bodies)
       REDAG_REQUIRES(lock_);
   void withdraw_if_halting() REDAG_REQUIRES(lock_) {
-    if (halted_at_ == kNever && halting()) withdraw();
+    if (halting() && halted_at_ == kNever) withdraw();
   }
   void withdraw() REDAG_REQUIRES(lock_);
   void wake_pause_waiters() REDAG_REQUIRES(lock_);

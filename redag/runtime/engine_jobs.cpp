@@ -25,11 +25,24 @@ const RunningJob *Engine::current_job() const noexcept {
   return job;
 }
 
-// Runs the taker's next job to its end, and decides what it does then. `at` is when the job begins, and is set to when
-// the thread's next job does. A job that follows another on its thread is charged for the decision between the two,
-// which saves reading clocks. On the clock, it does not take the time for which that decision was delayed, nor the time
-// to ask for the thread's processor time.
-void Engine::run(Taker &taker, Time &at) noexcept {
+// Runs the taker's next job, and those that it is given at the end of each. They need no wake-up. `at` is when the
+// first one begins. Not for a thread without a next job.
+void Engine::run(Taker &taker, Time at) noexcept {
+  WorkerThread &self = taker.thread;
+  RunningJob running(this, self);
+  Body doomed;  // of a removed task; destroyed without the lock
+  do {
+    if (self.led && running.below == nullptr && !taker.next.assignment.expected_short) follow(self);
+    at = run_next(taker, running, at, doomed);
+    if (doomed) doomed = nullptr;
+  } while (taker.next.kind == Next::Kind::Start);
+}
+
+// Runs the taker's next job to its end, and decides what it does then. Returns when the thread's next job begins. A job
+// that follows another on its thread is charged for the decision between the two, which saves reading clocks. On the
+// clock, it does not take the time for which that decision was delayed, nor the time to ask for the thread's processor
+// time.
+[[gnu::always_inline]] inline Time Engine::run_next(Taker &taker, RunningJob &running, Time at, Body &doomed) noexcept {
   WorkerThread &self = taker.thread;
   const Assignment &assignment = taker.next.assignment;
   const Job &job = assignment.job;
@@ -44,23 +57,19 @@ void Engine::run(Taker &taker, Time &at) noexcept {
     const Time begun = now();
     tell(JobEventKind::Started, begun, begun);
   }
-  RunningJob running;
-  running.engine = this;
-  running.thread = self.index;
-  running.outranked = &self.outranked;
   running.task = job.task;
   running.slot = job.slot;
   running.origin = job.origin;
-  running.top = &self.top;
-  running.limit = assignment.entry->next_limit(running);
+  running.limit = assignment.entry->first_limit;
   running.measured = assignment.measured;
+  running.used_wcet_low = running.used_budget = running.reported = false;
+  running.ended = kNever;
   if (self.meter.needs_reading(at, !assignment.expected_short)) {
     self.meter.set(thread_cpu_now(), at);
     at = now();
   }
   running.begun = at;
   running.start = self.meter.start();
-  running.below = RunningJob::current();
   RunningJob::set_current(&running);
   running.enter();
   const Outcome outcome = call(assignment);
@@ -72,7 +81,7 @@ void Engine::run(Taker &taker, Time &at) noexcept {
     self.meter.pass();
   }
   if (is_traced || tap != nullptr) tell(JobEventKind::Executed, running.ended, running.charged);
-  finish(taker, running, outcome, at);
+  return finish(taker, running, outcome, doomed);
 }
 
 inline Outcome Engine::call(const Assignment &assignment) {
@@ -86,13 +95,12 @@ inline Outcome Engine::call(const Assignment &assignment) {
   }
 }
 
-// Sets `next_begins` to when the thread's next job begins.
-[[gnu::always_inline]] inline void Engine::finish(Taker &taker, RunningJob &running, Outcome outcome,
-                                                  Time &next_begins) {
-  Body doomed;  // of a removed task; destroyed without the lock
+// Returns when the thread's next job begins. Moves the body to `doomed` if that was the last job of a removed task.
+[[gnu::always_inline]] inline Time Engine::finish(Taker &taker, RunningJob &running, Outcome outcome, Body &doomed) {
+  WorkerThread &self = taker.thread;
   TaskEntry &entry = *taker.next.assignment.entry;
   const Time at = running.ended;
-  const Job job = taker.next.assignment.job;  // the decision replaces it
+  const Job &job = taker.next.assignment.job;  // until the decision replaces it
   const bool finished = outcome == Outcome::Finished;
   const Duration response = at - job.release;
   const Duration end_to_end = at - job.origin;
@@ -105,15 +113,10 @@ inline Outcome Engine::call(const Assignment &assignment) {
     Locked locked(*this, &delayed);
     withdraw_if_halting();
     entry.count(running.charged, at - running.begun);
-    taker.thread.used += running.charged;
-    const bool late = finished && response > entry.deadline;
-    if (late) ++entry.late;
+    self.used += running.charged;
+    if (finished && response > entry.deadline) count_late(job, entry, at);
     if (finished && end_to_end > entry.dag_deadline) ++entry.late_end_to_end;
     if (options_.misses != nullptr) note_misses(locked, job, entry, at, outcome);
-    if (const trace::Tap *const tap = trace::tap(); tap != nullptr && late && entry.deadline > 0) {
-      tap->late(this, {at, at, job.task, job.number, job.worker.value, JobEventKind::Finished, Reason::None, 0},
-                response - entry.deadline);
-    }
     --entry.busy;
     if (entry.removed && entry.busy == 0) doomed.swap(entry.body);
     if (running.charged > running.limit) {
@@ -124,12 +127,22 @@ inline Outcome Engine::call(const Assignment &assignment) {
     if (may_hand_over() && placement_.hand_over(taker, step, tasks_, locked.waited())) {
       if (!step.events.empty()) report(locked, step.events);
     } else {
-      placement_.end(taker.thread);
-      carry_out(locked, step, at, &taker.thread == &pool_.caller() ? nullptr : &taker);
+      const bool is_caller = &self == &pool_.caller();
+      taker.next.kind = Next::Kind::Nothing;
+      placement_.end(self);
+      carry_out(locked, step, at, is_caller ? nullptr : &taker);
       if (placement_.unfinished() == 0) end_of_jobs();
     }
   }
-  next_begins = delayed || !running.on_trust ? now() : at;
+  return delayed || !running.on_trust ? now() : at;
+}
+
+[[gnu::noinline]] void Engine::count_late(const Job &job, TaskEntry &entry, Time at) {
+  ++entry.late;
+  const trace::Tap *const tap = trace::tap();
+  if (tap == nullptr || entry.deadline <= 0) return;
+  tap->late(this, {at, at, job.task, job.number, job.worker.value, JobEventKind::Finished, Reason::None, 0},
+            at - job.release - entry.deadline);
 }
 
 void Engine::note_misses(Locked &locked, const Job &job, const TaskEntry &entry, Time at, Outcome outcome) {
@@ -154,6 +167,13 @@ void Engine::end_of_jobs() {
   if (halted_at_ != kNever) idle_event_.set();
   if (pause_waiters_ > 0) wake_pause_waiters();
 }
+
+RunningJob::RunningJob(Engine *its_engine, WorkerThread &its_thread) noexcept
+    : engine(its_engine),
+      thread(its_thread.index),
+      outranked(&its_thread.outranked),
+      below(current()),
+      top(&its_thread.top) {}
 
 void RunningJob::close() noexcept {
   if (ended == kNever) end();
@@ -242,7 +262,7 @@ void Engine::watch(const WatchLimits &limits, Time as_of, std::vector<OverdueJob
 
 void Engine::preemption_point(RunningJob &job) {
   Taker taker{pool_[job.thread], job.slot, Next()};
-  Time at = now();
+  const Time at = now();
   {
     Locked locked(*this);
     withdraw_if_halting();
@@ -253,7 +273,7 @@ void Engine::preemption_point(RunningJob &job) {
   if (taker.next.kind != Next::Kind::Start) return;
   const Duration used = job.cpu_time();
   taker.thread.meter.pass();
-  while (taker.next.kind == Next::Kind::Start) run(taker, at);
+  run(taker, at);
   REDAG_CHECK(taker.next.kind == Next::Kind::Resume, "a suspended job was not resumed");
   job.start = CpuMeter::Start{thread_cpu_now() - used, true};
   job.enter();

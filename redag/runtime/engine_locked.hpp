@@ -12,7 +12,7 @@
 
 namespace redag::runtime {
 
-/// Holds the engine's lock. Wakes threads and reports skips after releasing it.
+/// Holds the engine's lock. Wakes threads and reports skips after releasing it. Most decisions have neither.
 class REDAG_SCOPED_CAPABILITY Engine::Locked {
  public:
   /// `delayed`, if not null, is set at the end: true if the thread slept for the lock, or woke others. Both can take
@@ -32,13 +32,8 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
   }
   ~Locked() REDAG_RELEASE() {
     const bool woke = engine_.lock_.unlock();
-    wake_ups_.wake_late();
     if (delayed_ != nullptr) *delayed_ = woke || wake_ups_.any();
-    for (std::size_t i = 0; i < skip_count_; ++i) {
-      few_skips_[i].listener->skipped(few_skips_[i].reason);
-      std::destroy_at(&few_skips_[i]);
-    }
-    for (const Skip &skip : more_skips_) skip.listener->skipped(skip.reason);
+    if (wake_ups_.any() || skip_count_ > 0) wake_and_tell();
   }
   Locked(const Locked &) = delete;
   Locked &operator=(const Locked &) = delete;
@@ -63,15 +58,25 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
   [[nodiscard]] bool waited() const { return !at_once_; }
 
  private:
-  Engine &engine_;
-  WakeUps wake_ups_;
-  bool *delayed_ = nullptr;
-  bool at_once_ = true;  // the lock was free
   struct Skip {
     std::shared_ptr<SkipListener> listener;
     Reason reason = Reason::None;
   };
   static constexpr std::size_t kFewSkips = 8;
+
+  [[gnu::noinline]] void wake_and_tell() {
+    wake_ups_.wake_late();
+    for (std::size_t i = 0; i < skip_count_; ++i) {
+      few_skips_[i].listener->skipped(few_skips_[i].reason);
+      std::destroy_at(&few_skips_[i]);
+    }
+    for (const Skip &skip : more_skips_) skip.listener->skipped(skip.reason);
+  }
+
+  Engine &engine_;
+  WakeUps wake_ups_;
+  bool *delayed_ = nullptr;
+  bool at_once_ = true;  // the lock was free
   union {
     // Only the first skip_count_ are constructed; the others cost nothing.
     Skip few_skips_[kFewSkips];  // NOLINT(readability-identifier-naming): a private member, of a union without a name

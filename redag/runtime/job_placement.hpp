@@ -66,9 +66,8 @@ class JobPlacement {
     TaskEntry &entry = tasks[next.task];
     mailboxes_.end(self);
     if (mailboxes_.should_leave(entry, waited)) return false;
-    self.stack.pop_back();
-    --unfinished_;
-    assign(self, next, entry, taker.next.assignment);
+    fill(self, next, entry, taker.next.assignment);
+    self.stack.back() = taker.next.assignment.job;
     if (os_) move_priority(self, taker.next.assignment);
     mailboxes_.begin(self, entry);
     return true;
@@ -98,9 +97,13 @@ class JobPlacement {
   // `assignment`, which these fill, is the thread's mail or its next action.
   void move_job(WorkerThread &from, WorkerThread &to, bool may_lead, Assignment &assignment);
   void assign(WorkerThread &thread, const sched::Dispatch &dispatch, TaskEntry &entry, Assignment &assignment) {
+    fill(thread, dispatch, entry, assignment);
+    ++unfinished_;
+    thread.stack.push_back(assignment.job);
+  }
+  static void fill(WorkerThread &thread, const sched::Dispatch &dispatch, TaskEntry &entry, Assignment &assignment) {
     REDAG_CHECK(entry.busy < entry.concurrency, "more jobs of one task at a time than it allows");
     ++entry.busy;
-    ++unfinished_;
     assignment.job = {.task = dispatch.task,
                       .number = dispatch.number,
                       .release = dispatch.release,
@@ -108,9 +111,8 @@ class JobPlacement {
                       .slot = dispatch.job,
                       .worker = dispatch.worker};
     assignment.entry = &entry;
-    assignment.measured = entry.always_measured();
+    assignment.measured = entry.always_measured;
     assignment.expected_short = entry.expected_short();
-    thread.stack.push_back(assignment.job);
     thread.level = dispatch.level;
     thread.is_spared = dispatch.inherits || entry.is_high;
   }

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The job that a thread runs now, for preemption_point() and job_cpu_time(). Internal to the engine. Written by that
-// thread.
+// thread. Jobs that follow each other on the thread use one object.
 #pragma once
 
 #include <cstdint>
@@ -16,6 +16,7 @@ namespace redag::runtime {
 
 class Engine;
 struct RunningJob;
+struct WorkerThread;
 
 namespace detail {
 
@@ -25,19 +26,26 @@ extern constinit thread_local RunningJob *current_job __attribute__((tls_model("
 }  // namespace detail
 
 struct RunningJob {
-  Engine *engine = nullptr;
-  std::uint32_t thread = 0;                 // index among the engine's threads
-  const Atomic<bool> *outranked = nullptr;  // set while a more urgent job could run on top
+  RunningJob(Engine *its_engine, WorkerThread &its_thread) noexcept;
+  RunningJob(const RunningJob &) = delete;
+  RunningJob &operator=(const RunningJob &) = delete;
+
+  // The same for all jobs that follow each other on the thread:
+  Engine *const engine;
+  const std::uint32_t thread;           // index among the engine's threads
+  const Atomic<bool> *const outranked;  // set while a more urgent job could run on top
+  RunningJob *const below;
+  Atomic<RunningJob *> *const top;  // WorkerThread::top of its thread: points here while the body runs
+
+  // Set by Engine::run() for each job:
   TaskId task;
   JobSlot slot;
-  Time origin = 0;          // see Job
-  Duration limit = kNever;  // processor time of its next limit to check; kNever: none
-  Time begun = 0;           // on the engine's clock
-  CpuMeter::Start start;    // excludes jobs that ran on top
-  bool measured = false;    // its processor time is asked for, however short it was
-  RunningJob *below = nullptr;
-  Atomic<RunningJob *> *top = nullptr;  // WorkerThread::top of its thread: points here while the body runs
-  bool used_wcet_low = false;           // reported to the scheduler; written under the engine's lock
+  Time origin = 0;             // see Job
+  Duration limit = kNever;     // processor time of its next limit to check; kNever: none
+  Time begun = 0;              // on the engine's clock
+  CpuMeter::Start start;       // excludes jobs that ran on top
+  bool measured = false;       // its processor time is asked for, however short it was
+  bool used_wcet_low = false;  // reported to the scheduler; written under the engine's lock
   bool used_budget = false;
   bool reported = false;  // was reported overdue; written under the engine's lock
   // Set by close():

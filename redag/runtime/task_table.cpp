@@ -3,11 +3,23 @@
 
 #include "redag/runtime/task_table.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "redag/base/check.hpp"
 
 namespace redag::runtime {
+
+void TaskEntry::set_limits(const Task &task) {
+  wcet = task.wcet;
+  wcet_low = task.wcet_low;
+  budget = task.budget;
+  cuts_off = task.on_budget == OnBudget::Abort;
+  always_measured = wcet_low > 0 || budget > 0 || (wcet > 0 && wcet < CpuMeter::kShort);
+  const auto or_never = [](Duration limit) { return limit > 0 ? limit : kNever; };
+  first_limit = std::min(or_never(wcet_low), or_never(budget));
+  least_limit = std::min(or_never(wcet), or_never(budget));
+}
 
 void TaskTable::add(TaskId id, const Task &task, const TaskRole &role, Body &body,
                     std::shared_ptr<SkipListener> listener) {
@@ -20,10 +32,7 @@ void TaskTable::add(TaskId id, const Task &task, const TaskRole &role, Body &bod
   entry = TaskEntry{};
   entry.body.swap(body);
   entry.listener = std::move(listener);
-  entry.wcet = task.wcet;
-  entry.wcet_low = task.wcet_low;
-  entry.budget = task.budget;
-  entry.cuts_off = task.on_budget == OnBudget::Abort;
+  entry.set_limits(task);
   entry.is_high = role.is_high;
   ++(role.is_high ? high_ : others_);
   entry.deadline = task.deadline;

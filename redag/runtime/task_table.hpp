@@ -35,14 +35,14 @@ struct TaskEntry {
 
   /// Counts a job that ended, used `used` of processor time and took `took` on the clock.
   void count(Duration used, Duration took) {
-    short_jobs = took <= CpuMeter::kShort ? std::min(short_jobs + 1, kStreak) : 0;
-    tiny_score = took <= kTiny ? std::min(tiny_score + 3, kMostTinyScore) : tiny_score - (tiny_score > 0 ? 1 : 0);
+    const bool as_ever = took <= kTiny && short_jobs == kStreak && tiny_score == kMostTinyScore;
+    if (!as_ever) learn(took);
     ++usage.jobs;
     usage.total += used;
     usage.longest = std::max(usage.longest, used);
-    if (wcet > 0 && used > wcet) ++usage.over_wcet;
-    if (budget > 0 && used > budget) ++usage.over_budget;
+    if (used > least_limit) count_excess(used);
   }
+  void set_limits(const Task &task);
 
   /// Processor time of the job's next limit, given what was reported before; kNever: none.
   [[nodiscard]] Duration next_limit(const RunningJob &job) const {
@@ -52,13 +52,8 @@ struct TaskEntry {
     return next;
   }
 
-  /// Returns true if its jobs are always measured: their limits act at once, or its wcet is below the time charged
-  /// without measuring.
-  [[nodiscard]] bool always_measured() const {
-    return wcet_low > 0 || budget > 0 || (wcet > 0 && wcet < CpuMeter::kShort);
-  }
   /// Returns true if its last jobs were short: the next one is expected to be short, too.
-  [[nodiscard]] bool expected_short() const { return !always_measured() && short_jobs == kStreak; }
+  [[nodiscard]] bool expected_short() const { return short_jobs == kStreak && !always_measured; }
   /// Returns true if more than a quarter of its last jobs were tiny: where threads compete for the engine's lock, tiny
   /// jobs that release others often take longer.
   [[nodiscard]] bool expected_tiny() const { return tiny_score > kMostTinyScore / 3; }
@@ -72,11 +67,17 @@ struct TaskEntry {
 
   Body body;
   std::shared_ptr<SkipListener> listener;  // can be null
+  // set_limits():
   Duration wcet = 0;
   Duration wcet_low = 0;
   Duration budget = 0;
   bool cuts_off = false;  // on_budget: abort
-  bool is_high = false;   // of a DAG of high criticality
+  // Its jobs are always measured: their limits act at once, or its wcet is below the time charged without measuring.
+  bool always_measured = false;
+  Duration first_limit = kNever;  // next_limit() of a job that begins
+  Duration least_limit = kNever;  // of wcet and budget; kNever: none
+
+  bool is_high = false;  // of a DAG of high criticality
   Usage usage;
   Duration deadline = 0;
   Duration dag_deadline = kNever;       // of a sink; kNever: none
@@ -92,6 +93,16 @@ struct TaskEntry {
   std::uint32_t short_jobs = 0;   // consecutive short jobs up to now; at most kStreak
   std::uint32_t tiny_score = 0;   // a tiny job adds 3, another one takes 1
   bool removed = false;
+
+ private:
+  void learn(Duration took) {
+    short_jobs = took <= CpuMeter::kShort ? std::min(short_jobs + 1, kStreak) : 0;
+    tiny_score = took <= kTiny ? std::min(tiny_score + 3, kMostTinyScore) : tiny_score - (tiny_score > 0 ? 1 : 0);
+  }
+  [[gnu::noinline]] void count_excess(Duration used) {
+    if (wcet > 0 && used > wcet) ++usage.over_wcet;
+    if (budget > 0 && used > budget) ++usage.over_budget;
+  }
 };
 
 class TaskTable {

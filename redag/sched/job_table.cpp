@@ -180,6 +180,12 @@ std::uint32_t JobTable::new_slot() {
   return slot;
 }
 
+// The task has no free slot: only timers without an overrun rule get more.
+[[gnu::noinline]] std::uint32_t JobTable::one_more_slot(const TaskState &task) {
+  REDAG_CHECK(task.queue_depth == kUnboundedQueue, "a task has more jobs than its overrun rule allows");
+  return new_slot();
+}
+
 std::int64_t JobTable::own_key(const Job &job) const {
   const TaskState &task = task_of(job);
   if (job.demoted || task.degraded) return demoted_key(task);

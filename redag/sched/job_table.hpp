@@ -94,26 +94,40 @@ class JobTable {
 
   /// Takes a free slot for a job of the task.
   [[nodiscard, gnu::always_inline]] std::uint32_t take_slot(TaskState &task) {
-    if (task.free_slot == kNil && task.queue_depth == kUnboundedQueue) return new_slot();
     const std::uint32_t slot = task.free_slot;
-    REDAG_CHECK(slot != kNil, "a task has more jobs than its overrun rule allows");
+    if (slot == kNil) return one_more_slot(task);
     task.free_slot = jobs[slot].next;
     return slot;
   }
-  void free_slot(std::uint32_t slot) {
-    TaskState &task = task_of(jobs[slot]);
+  void free_slot(std::uint32_t slot) { free_slot(slot, task_of(jobs[slot])); }
+  void free_slot(std::uint32_t slot, TaskState &task) {
     jobs[slot].state = JobState::Free;
     jobs[slot].next = task.free_slot;
     task.free_slot = slot;
   }
 
+  // ---- counts of jobs that have not started ----
+
+  /// A job of the task is released.
+  void count_pending(const TaskState &task) { ++dags[task.dag.value].pending; }
+  /// The pending job becomes ready.
+  void count_ready(TaskState &task, std::uint32_t slot) {
+    ++task.ready_count;
+    task.latest_ready = slot;
+  }
+
   // ---- decisions; the step records them ----
 
   [[gnu::always_inline]] void start(std::uint32_t slot, WorkerId worker, std::uint32_t over, std::uint32_t level) {
-    Job &job = jobs[slot];
-    TaskState &task = task_of(job);
+    TaskState &task = task_of(jobs[slot]);
     --task.ready_count;
     --dags[task.dag.value].pending;
+    start_uncounted(slot, worker, over, level);
+  }
+  /// As start(), for a job that was counted neither as pending nor as ready.
+  [[gnu::always_inline]] void start_uncounted(std::uint32_t slot, WorkerId worker, std::uint32_t over,
+                                              std::uint32_t level) {
+    Job &job = jobs[slot];
     job.state = JobState::Running;
     job.worker = worker;
     step.emit(job, JobEventKind::Dispatched, job.deadline);
@@ -186,6 +200,7 @@ class JobTable {
   std::uint32_t join_group(const std::string &name);
   void leave_group(std::uint32_t position);
   std::uint32_t new_slot();
+  std::uint32_t one_more_slot(const TaskState &task);
 
   std::map<std::string, std::uint32_t> group_positions_;
   std::vector<Group> groups_;

@@ -36,11 +36,14 @@ concept Dispatcher = requires(D dispatcher, const D &decided, std::uint32_t slot
 /// A dispatcher that can put a new job in the place of one that ends, without a decision over all jobs.
 template <class D>
 concept HandsOver = requires(D dispatcher, const D &decided, const Job &job, std::uint32_t slot) {
+  // Returns true if jobs of the two tasks need the same places, apart from those of each task. Constant between two
+  // calls of on_reconfigured().
+  { decided.share_gates(TaskId(), TaskId()) } -> std::same_as<bool>;
   // Returns true if nothing but the new job of the task depends on the end of `job`: no job waits for its gates, and
-  // none runs below it.
+  // none runs below it. The tasks share their gates.
   { decided.can_replace(job, TaskId()) } -> std::same_as<bool>;
-  // The first job ends, and the second, which is ready and not queued, starts in its place if it is the most urgent
-  // one. Takes all decisions of the step. The last argument is the most jobs that may start.
+  // The first job ends, and the second, which is ready, starts in its place if it is the most urgent one. It is neither
+  // queued nor counted. Takes all decisions of the step. The last argument is the most jobs that may start.
   dispatcher.replace(slot, slot, std::uint32_t{});
 };
 
@@ -100,6 +103,7 @@ class Lifecycle final : public Scheduler {
   }
   void load(const Workload &workload);
   void reprioritise();
+  void find_heirs();
 
   // From release to readiness.
   inline void admit(TaskId id, Time nominal, Time origin);
@@ -108,10 +112,11 @@ class Lifecycle final : public Scheduler {
   static std::uint32_t count_release(TaskState &task);
   [[nodiscard]] Time turn_of(const TaskState &task, Time origin) const;
   inline void make_ready(std::uint32_t slot, Time origin);
-  [[nodiscard, gnu::always_inline]] inline std::uint32_t add_job(TaskId id, std::uint32_t number, Time nominal,
-                                                                 Time turn);
-  [[gnu::always_inline]] inline void prepare(std::uint32_t slot, Time origin);
+  [[nodiscard, gnu::always_inline]] inline std::uint32_t add_job(TaskId id, TaskState &task, std::uint32_t number,
+                                                                 Time nominal, Time turn);
+  [[gnu::always_inline]] inline void prepare(Job &job, const TaskState &task, Time origin);
   [[gnu::always_inline]] inline bool hand_over(std::uint32_t slot, Time now, std::uint32_t most) requires HandsOver<D>;
+  void tell_hand_over(const Job &ended, const Job &next, Time now);
   void skip(std::uint32_t slot, Reason reason);
   template <class Predicate>
   void skip_all(Reason reason, Predicate which);

@@ -130,21 +130,32 @@ bool Lifecycle<D>::hand_over(std::uint32_t slot, Time now, std::uint32_t most) r
   if (!heir.valid() || most == 0) return false;
   TaskState &task = table_.tasks[job.task.value];
   TaskState &next = table_.tasks[heir.value];
-  if (task.life != TaskLife::Live || next.life != TaskLife::Live || next.ready_count > 0) return false;
-  if (table_.dags[next.dag.value].max_pending > 0 || !table_.step.is_new()) return false;
+  if (next.ready_count > 0 || !table_.step.is_new()) return false;
   if (!dispatcher_.can_replace(job, heir)) return false;
 
   table_.step.begin(now);
   ++task.finished;
-  table_.step.emit(job, JobEventKind::Finished, now);
   const Precedence::Data data = table_.precedence.hand_on(job.task, job.release, job.origin, now);
-  const std::uint32_t number = count_release(next);
-  table_.step.emit(heir, number, WorkerId(), JobEventKind::Released, data.complete);
-  const std::uint32_t its_slot = add_job(heir, number, data.complete, takes_turns_ ? data.origin : 0);
-  prepare(its_slot, data.origin);
+  REDAG_CHECK(next.free_slot != kNil, "a task without a waiting or ready job has no free slot");
+  const std::uint32_t its_slot =
+      add_job(heir, next, count_release(next), data.complete, takes_turns_ ? data.origin : 0);
+  Job &its_job = table_.jobs[its_slot];
+  prepare(its_job, next, data.origin);
+  if (table_.step.records(JobEventKind::Finished) || table_.step.records(JobEventKind::Released) ||
+      table_.step.records(JobEventKind::Ready)) {
+    tell_hand_over(job, its_job, now);
+  }
   dispatcher_.replace(slot, its_slot, most);
-  table_.free_slot(slot);
+  table_.free_slot(slot, task);
   return true;
+}
+
+// One call for all three events: without a trace, hand_over() is shorter by more than the checks.
+template <Dispatcher D>
+[[gnu::noinline]] void Lifecycle<D>::tell_hand_over(const Job &ended, const Job &next, Time now) {
+  table_.step.emit(ended, JobEventKind::Finished, now);
+  table_.step.emit(next, JobEventKind::Released, next.release);
+  table_.step.emit(next, JobEventKind::Ready, next.origin);
 }
 
 template <Dispatcher D>
@@ -177,7 +188,8 @@ void Lifecycle<D>::admit(TaskId id, Time nominal, Time origin) {
     return;
   }
 
-  const std::uint32_t slot = add_job(id, number, nominal, turn);
+  const std::uint32_t slot = add_job(id, task, number, nominal, turn);
+  table_.count_pending(task);
   if (complete_set) {
     make_ready(slot, has_data ? table_.precedence.consume(id).origin : origin);
   } else {
@@ -188,12 +200,10 @@ void Lifecycle<D>::admit(TaskId id, Time nominal, Time origin) {
 
 // Gives the new job a slot.
 template <Dispatcher D>
-std::uint32_t Lifecycle<D>::add_job(TaskId id, std::uint32_t number, Time nominal, Time turn) {
-  TaskState &task = table_.tasks[id.value];
+std::uint32_t Lifecycle<D>::add_job(TaskId id, TaskState &task, std::uint32_t number, Time nominal, Time turn) {
   const std::uint32_t slot = table_.take_slot(task);
   table_.jobs[slot] =
       Job{.task = id, .number = number, .release = nominal, .deadline = nominal + task.deadline, .turn = turn};
-  ++table_.dags[task.dag.value].pending;
   return slot;
 }
 
@@ -210,19 +220,18 @@ Time Lifecycle<D>::turn_of(const TaskState &task, Time origin) const {
 
 template <Dispatcher D>
 void Lifecycle<D>::make_ready(std::uint32_t slot, Time origin) {
-  TaskState &task = table_.task_of(table_.jobs[slot]);
+  Job &job = table_.jobs[slot];
+  TaskState &task = table_.task_of(job);
   if (task.waiting == slot) task.waiting = kNil;
-  prepare(slot, origin);
+  table_.count_ready(task, slot);
+  prepare(job, task, origin);
+  table_.step.emit(job, JobEventKind::Ready, origin);
   dispatcher_.on_ready(slot);
 }
 
 // The job becomes ready, and gets its place in the order of jobs.
 template <Dispatcher D>
-void Lifecycle<D>::prepare(std::uint32_t slot, Time origin) {
-  Job &job = table_.jobs[slot];
-  TaskState &task = table_.task_of(job);
-  ++task.ready_count;
-  task.latest_ready = slot;
+void Lifecycle<D>::prepare(Job &job, const TaskState &task, Time origin) {
   job.state = JobState::Ready;
   job.origin = origin;
   job.sequence = next_sequence_++;
@@ -235,7 +244,6 @@ void Lifecycle<D>::prepare(std::uint32_t slot, Time origin) {
       break;
     default: job.key = task.key; break;
   }
-  table_.step.emit(job, JobEventKind::Ready, origin);
 }
 
 template <Dispatcher D>
@@ -302,6 +310,7 @@ void Lifecycle<D>::remove_dag(DagId dag, Time now) {
     table_.tasks[task.value].life = TaskLife::Removed;
     forget_skip(table_.tasks[task.value]);
   }
+  find_heirs();
   skip_all(Reason::Removed, [&](const Job &job) { return table_.tasks[job.task.value].dag == dag; });
 }
 
@@ -312,6 +321,7 @@ void Lifecycle<D>::remove_task(TaskId task, Time now) {
   if (table_.tasks[task.value].life != TaskLife::Live) return;
   table_.tasks[task.value].life = TaskLife::Removed;
   forget_skip(table_.tasks[task.value]);
+  find_heirs();
   skip_all(Reason::Removed, [&](const Job &job) { return job.task == task; });
 }
 
@@ -331,6 +341,20 @@ template <Dispatcher D>
 void Lifecycle<D>::reprioritise() {
   table_.prioritise();
   dispatcher_.on_reconfigured();
+  find_heirs();
+}
+
+// Finds the tasks whose jobs can take the place of the job before. What does not change between two reconfigurations is
+// checked here, and the rest by hand_over().
+template <Dispatcher D>
+void Lifecycle<D>::find_heirs() {
+  if constexpr (HandsOver<D>) {
+    table_.precedence.find_heirs([this](TaskId from, TaskId to) {
+      const TaskState &next = table_.tasks[to.value];
+      const bool both_live = table_.tasks[from.value].life == TaskLife::Live && next.life == TaskLife::Live;
+      return both_live && table_.dags[next.dag.value].max_pending == 0 && dispatcher_.share_gates(from, to);
+    });
+  }
 }
 
 template <Dispatcher D>

@@ -42,7 +42,6 @@ void Precedence::add_dag(const Dag &dag, std::span<const TaskId> ids) {
     successors_.insert(successors_.end(), outgoing[i].begin(), outgoing[i].end());
     node.last_successor = static_cast<std::uint32_t>(successors_.size());
   }
-  find_heirs();
 }
 
 // Compacts the edge arrays so that removed tasks cost no storage.
@@ -74,7 +73,6 @@ void Precedence::forget(std::span<const TaskId> tasks) {
   }
   edges_ = std::move(edges);
   successors_ = std::move(successors);
-  find_heirs();
 }
 
 void Precedence::set_period(TaskId task, Duration period) {
@@ -93,16 +91,6 @@ bool Precedence::count_fresh(Node &node) {
   node.fresh = 0;
   for (std::uint32_t i = node.first_edge; i < node.last_edge; ++i) node.fresh += serves(edges_[i], node) ? 1U : 0U;
   return node.fresh == node.last_edge - node.first_edge;
-}
-
-void Precedence::find_heirs() {
-  for (Node &node : nodes_) {
-    node.heir = TaskId();
-    if (node.last_successor - node.first_successor != 1) continue;
-    const TaskId to = edges_[successors_[node.first_successor]].to;
-    const Node &successor = nodes_[to.value];
-    if (!successor.timer && successor.last_edge - successor.first_edge == 1) node.heir = to;
-  }
 }
 
 bool Precedence::on_release(TaskId task, Time release) {

@@ -47,11 +47,26 @@ class Precedence {
     return data;
   }
 
-  /// The only successor of the task, if that is a data task without other predecessors. Otherwise no task.
+  /// Finds the heir of each task: its only successor, if that is a data task without other predecessors, and
+  /// may_inherit(task, successor) is true. To be called after each change. Linear in the tasks.
+  template <class MayInherit>
+  void find_heirs(MayInherit may_inherit) {
+    for (std::uint32_t t = 0; t < nodes_.size(); ++t) {
+      Node &node = nodes_[t];
+      node.heir = TaskId();
+      if (node.last_successor - node.first_successor != 1) continue;
+      node.heir_edge = successors_[node.first_successor];
+      const TaskId to = edges_[node.heir_edge].to;
+      const Node &successor = nodes_[to.value];
+      const bool is_alone = !successor.timer && successor.last_edge - successor.first_edge == 1;
+      if (is_alone && may_inherit(TaskId(t), to)) node.heir = to;
+    }
+  }
+  /// The heir of the task, or no task.
   [[nodiscard]] TaskId heir(TaskId task) const { return nodes_[task.value].heir; }
   /// As on_complete(), and consume() for the heir of the task, which it must have.
   Data hand_on(TaskId task, Time release, Time origin, Time finish) {
-    Edge &edge = edges_[successors_[nodes_[task.value].first_successor]];
+    Edge &edge = edges_[nodes_[task.value].heir_edge];
     edge.take(release, origin, finish);
     return Data{edge.origin, finish};
   }
@@ -110,6 +125,7 @@ class Precedence {
     Duration period = 0;
     Duration offset = 0;
     bool timer = true;
+    std::uint32_t heir_edge = 0;  // from the task to its heir
   };
 
   /// Returns true if the edge has data for the successor's last job.
@@ -117,7 +133,6 @@ class Precedence {
     return edge.fresh && (!edge.aligned || edge.release == successor.last_release);
   }
   [[nodiscard]] bool count_fresh(Node &node);
-  void find_heirs();
   Node &add_node(const Task &task, TaskId id);
   [[nodiscard]] static bool is_aligned(const Node &from, const Node &to);
 

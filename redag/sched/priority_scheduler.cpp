@@ -27,7 +27,9 @@ PriorityDispatcher::PriorityDispatcher(JobTable &table)
 // ---- decisions ----
 
 inline void PriorityDispatcher::decide(std::uint32_t most) {
-  for (std::uint32_t best = top(); best != kNil; best = top()) {
+  while (may_place()) {
+    const std::uint32_t best = top();
+    if (best == kNil) break;
     Job &job = table_.jobs[best];
     const bool starts = !job.started();
     if (starts && most == 0) {
@@ -36,24 +38,26 @@ inline void PriorityDispatcher::decide(std::uint32_t most) {
     }
     Place place;
     if (!find_place(job, place)) break;
-    if (starts) {
-      if (park_if_not_eligible(best, job)) continue;
-      --most;
+    if (!starts) {
+      resume(best, job, place);
+      continue;
     }
-    run(best, job, place);
+    if (park_if_not_eligible(best, job)) continue;
+    --most;
+    start(best, job, place);
   }
   if (!open_workers_.empty()) close_open_workers();
   if (held_back_ != kNil) put_back();
 }
 
-// The new job holds the gates that both tasks share in the place of the ended one, which nobody waits for. A free
+// The new job holds the gates that both tasks share in the place of the ended one, for which no job waits. A free
 // worker that comes before the ended job's own would be the first choice.
 [[gnu::always_inline]] inline bool PriorityDispatcher::can_replace(const Job &job, TaskId next) const {
   if (job.state != JobState::Running || job.under != kNil || !open_workers_.empty()) return false;
   if (!free_workers_.empty() && (free_workers_.first() < job.worker.value || top() != kNil)) return false;
   const TaskGates &from = task_gates_[job.task.value];
   const TaskGates &to = task_gates_[next.value];
-  if (from.own.parked.top() != kNil || is_full(to.own) || !to.shares_all_with(from)) return false;
+  if (from.own.parked.top() != kNil || is_full(to.own)) return false;
   for (std::uint32_t i = 0; i < from.count; ++i) {
     if (shared_gates_[from.shared[i]].parked.top() != kNil) return false;
   }
@@ -67,6 +71,9 @@ inline void PriorityDispatcher::decide(std::uint32_t most) {
   if (top_slot != kNil) {
     job.child = static_ ? list_of(job) : kNil;
     if (!is_ahead(job, table_.jobs[top_slot])) {
+      TaskState &task = table_.task_of(job);
+      table_.count_pending(task);
+      table_.count_ready(task, slot);
       on_end(ended);
       push(slot);
       return decide(most);
@@ -76,13 +83,11 @@ inline void PriorityDispatcher::decide(std::uint32_t most) {
   --task_gates_[table_.jobs[ended].task.value].own.used;
   TaskGates &gates = task_gates_[job.task.value];
   ++gates.own.used;
-  gates.own.holder = slot;
   for (std::uint32_t i = 0; i < gates.count; ++i) shared_gates_[gates.shared[i]].holder = slot;
-  table_.start(slot, worker, kNil, level_of(job));
+  table_.start_uncounted(slot, worker, kNil, level_of(job));
   workers_[worker.value].running = slot;
   workers_[worker.value].stack = slot;
-  if (ended == least_urgent_) forget_least_urgent();
-  note_running(slot);
+  if (least_urgent_ != kNil) note_replaced(ended, slot);
   if (top_slot != kNil) decide(most - 1);
 }
 
@@ -151,27 +156,35 @@ inline bool PriorityDispatcher::outranks(const Job &a, const Job &b) const {
   return level_of_key_.empty() ? std::min(key, table_.tier_count()) : level_of_key_[key];
 }
 
-inline void PriorityDispatcher::run(std::uint32_t slot, Job &job, const Place &place) {
-  const bool resumes = job.started();
-  remove(slot);
-  if (!resumes) {
-    hold_gates(slot);
-    ++started_;
-  }
+[[gnu::always_inline]] inline void PriorityDispatcher::start(std::uint32_t slot, Job &job, const Place &place) {
+  remove_unstarted(slot);
+  hold_gates(slot, job);
+  ++started_;
   make_way(place);
-  job.under = table_.config.preemption == Preemption::Cooperative ? place.victim : kNil;
-  const std::uint32_t level = level_of(job);
-  resumes ? table_.resume(slot, place.worker, place.victim, level)
-          : table_.start(slot, place.worker, place.victim, level);
-  Worker &worker = workers_[place.worker.value];
-  worker.running = slot;
-  worker.stack = slot;
-  worker.open = false;
+  if (table_.config.preemption == Preemption::Cooperative) job.under = place.victim;
+  table_.start(slot, place.worker, place.victim, level_of(job));
+  occupy(place.worker, slot);
+}
+
+[[gnu::noinline]] void PriorityDispatcher::resume(std::uint32_t slot, const Job &job, const Place &place) {
+  remove(slot);
+  make_way(place);
+  table_.resume(slot, place.worker, place.victim, level_of(job));
+  occupy(place.worker, slot);
+}
+
+[[gnu::always_inline]] inline void PriorityDispatcher::occupy(WorkerId worker, std::uint32_t slot) {
+  workers_[worker.value] = Worker{.running = slot, .stack = slot};
   note_running(slot);
 }
 
-inline void PriorityDispatcher::note_running(std::uint32_t slot) {
+[[gnu::always_inline]] inline void PriorityDispatcher::note_running(std::uint32_t slot) {
   if (least_urgent_ != kNil && before(table_.jobs[least_urgent_], table_.jobs[slot])) least_urgent_ = slot;
+}
+
+[[gnu::noinline]] void PriorityDispatcher::note_replaced(std::uint32_t ended, std::uint32_t slot) {
+  if (ended == least_urgent_) forget_least_urgent();
+  note_running(slot);
 }
 
 inline void PriorityDispatcher::make_way(const Place &place) {
@@ -371,8 +384,12 @@ inline bool PriorityDispatcher::is_ahead(const Job &a, const Job &b) const {
   return static_ && a.child != b.child ? a.child < b.child : before(a, b);
 }
 
-inline void PriorityDispatcher::remove(std::uint32_t slot) {
+[[gnu::noinline]] void PriorityDispatcher::remove(std::uint32_t slot) {
   if (table_.jobs[slot].started()) --queued_started_;
+  remove_unstarted(slot);
+}
+
+inline void PriorityDispatcher::remove_unstarted(std::uint32_t slot) {
   if (slot == first_) {
     first_ = kNil;
   } else {
@@ -440,7 +457,7 @@ void PriorityDispatcher::on_reconfigured() {
     if (!job.started()) continue;
     tell_level(slot, kNil);
     if (job.state == JobState::Suspended && table_.config.preemption == Preemption::Full) push(slot);
-    hold_gates(slot);
+    hold_gates(slot, job);
   }
 }
 

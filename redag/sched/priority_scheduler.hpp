@@ -32,6 +32,9 @@ class PriorityDispatcher {
   void on_reconfigured();
   void on_preemption_point(std::uint32_t slot) { open(table_.jobs[slot].worker.value); }
   void decide(std::uint32_t most);
+  [[nodiscard]] bool share_gates(TaskId a, TaskId b) const {
+    return task_gates_[a.value].shares_all_with(task_gates_[b.value]);
+  }
   [[nodiscard]] bool can_replace(const Job &job, TaskId next) const;
   void replace(std::uint32_t ended, std::uint32_t slot, std::uint32_t most);
   [[nodiscard]] bool outranked(const Job &job) const { return top() != kNil && outranks(table_.jobs[top()], job); }
@@ -44,7 +47,7 @@ class PriorityDispatcher {
   struct Gate {
     std::uint32_t capacity = 1;
     std::uint32_t used = 0;       // jobs started and unfinished
-    std::uint32_t holder = kNil;  // group: the job that holds the group
+    std::uint32_t holder = kNil;  // shared gates: the job that started last; of a group, the only one
     HeapQueue parked;
   };
   enum class GateKind : std::uint8_t { Task, Dag, Group, Threads };
@@ -74,14 +77,21 @@ class PriorityDispatcher {
     std::uint32_t victim = kNil;  // the job that loses the worker
   };
 
+  /// Returns false if no job can start or resume, whichever it is.
+  [[nodiscard]] bool may_place() const {
+    return table_.config.preemption != Preemption::None || !free_workers_.empty();
+  }
   [[nodiscard]] bool find_place(const Job &job, Place &place);
   [[nodiscard]] std::uint32_t least_urgent_running();
   void forget_least_urgent() { least_urgent_ = kNil; }
   [[nodiscard]] bool outranks(const Job &a, const Job &b) const;
   [[nodiscard]] std::uint32_t level_of(const Job &job) const;
   void tell_level(std::uint32_t slot, std::uint32_t old_level);
-  void run(std::uint32_t slot, Job &job, const Place &place);
+  void start(std::uint32_t slot, Job &job, const Place &place);
+  void resume(std::uint32_t slot, const Job &job, const Place &place);
+  void occupy(WorkerId worker, std::uint32_t slot);
   void note_running(std::uint32_t slot);
+  void note_replaced(std::uint32_t ended, std::uint32_t slot);
   void make_way(const Place &place);
   bool park_if_not_eligible(std::uint32_t slot, const Job &job);
   void park(std::uint32_t slot, GateKind kind, std::uint32_t position);
@@ -97,6 +107,7 @@ class PriorityDispatcher {
   [[nodiscard]] std::uint32_t list_of(const Job &job) const;
   void push(std::uint32_t slot);
   void remove(std::uint32_t slot);
+  void remove_unstarted(std::uint32_t slot);
   void enqueue(std::uint32_t slot);
   void dequeue(std::uint32_t slot);
   [[nodiscard]] bool is_ahead(const Job &a, const Job &b) const;
@@ -117,11 +128,14 @@ class PriorityDispatcher {
     for (std::uint32_t i = 0; i < gates.count; ++i) f(shared_gates_[gates.shared[i]]);
   }
   /// A started job holds its gates until it ends.
-  void hold_gates(std::uint32_t slot) {
-    for_gates_of(table_.jobs[slot], [slot](Gate &gate) {
+  void hold_gates(std::uint32_t slot, const Job &job) {
+    TaskGates &gates = task_gates_[job.task.value];
+    ++gates.own.used;
+    for (std::uint32_t i = 0; i < gates.count; ++i) {
+      Gate &gate = shared_gates_[gates.shared[i]];
       ++gate.used;
       gate.holder = slot;
-    });
+    }
   }
   void open(std::uint32_t worker);
 

@@ -596,6 +596,24 @@ TEST(PriorityScheduler, ALimitLooksPastReadyJobsForSuspendedOnes) {
   EXPECT_EQ(rest.dispatches[0].over, low);
 }
 
+// The job that ended was the least urgent running one. A later job between the two must not be measured against it.
+TEST(PriorityScheduler, AJobThatTakesAPlaceIsItsOwnVictim) {
+  const Workload workload = make_workload(
+      {make_dag("chain", {{.name = "a", .period = 10, .priority = 2}, {.name = "b", .after = {0}, .priority = 4}}),
+       make_dag("others", {{.name = "c", .period = 10, .priority = 1}, {.name = "d", .period = 10, .priority = 3}})},
+      1, PreemptionMode::Os, PolicyKind::Fixed);
+  PriorityScheduler scheduler(workload, config_of(workload));
+  scheduler.release(TaskId(0), 0, 0);
+  const JobSlot a = scheduler.dispatch(0).dispatches.front().job;
+  scheduler.release(TaskId(2), 1, 1);
+  EXPECT_TRUE(scheduler.dispatch(1).dispatches.empty()) << "c does not preempt a";
+  const Step step = scheduler.finish(a, 2, Outcome::Finished);
+  ASSERT_EQ(step.dispatches.size(), 1U);
+  EXPECT_EQ(step.dispatches.front().task, TaskId(1)) << "b takes the place of a";
+  scheduler.release(TaskId(3), 3, 3);
+  EXPECT_TRUE(scheduler.dispatch(3).dispatches.empty()) << "d preempts a, and not b";
+}
+
 TEST(PriorityScheduler, RecordsOnlyTheKindsAskedFor) {
   const Workload workload = make_workload({make_dag("a", {{"t", 10}})}, 1);
   PriorityScheduler scheduler(workload, {});

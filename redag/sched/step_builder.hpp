@@ -7,12 +7,48 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <vector>
+#include <memory>
+#include <span>
+#include <utility>
 
 #include "redag/sched/job.hpp"
 #include "redag/sched/scheduler.hpp"
 
 namespace redag::sched {
+
+/// A growing array that is filled anew for each step. Unlike std::vector, it writes an entry to its place without a
+/// copy, keeps its size without a division, and does not inline how it grows.
+template <class T>
+class StepEntries {
+ public:
+  void reserve(std::size_t count) {
+    if (count <= capacity_) return;
+    auto room = std::make_unique<T[]>(count);
+    std::copy_n(room_.get(), count_, room.get());
+    room_ = std::move(room);
+    capacity_ = count;
+  }
+  void clear() { count_ = 0; }
+  [[nodiscard]] bool empty() const { return count_ == 0; }
+  [[nodiscard]] std::span<const T> all() const { return {room_.get(), count_}; }
+
+  [[gnu::always_inline]] void add(const T &entry) {
+    if (count_ == capacity_) grow();
+    room_[count_++] = entry;
+  }
+  template <class Predicate>
+  void remove_if(Predicate predicate) {
+    T *const first = room_.get();
+    count_ = static_cast<std::size_t>(std::remove_if(first, first + count_, predicate) - first);
+  }
+
+ private:
+  [[gnu::noinline]] void grow() { reserve(2 * capacity_ + 16); }
+
+  std::unique_ptr<T[]> room_;  // the first `count_` entries are in use
+  std::size_t count_ = 0;
+  std::size_t capacity_ = 0;
+};
 
 class StepBuilder {
  public:
@@ -32,7 +68,7 @@ class StepBuilder {
   /// Returns the step: the result of dispatch().
   [[nodiscard]] Step read() {
     was_read_ = true;
-    return Step{dispatches_, events_};
+    return Step{dispatches_.all(), events_.all()};
   }
 
   [[nodiscard]] Time now() const { return now_; }
@@ -46,31 +82,33 @@ class StepBuilder {
   /// From now on, only events of these kinds are kept.
   void record_only(EventKinds kinds) { recorded_ = kinds; }
 
+  [[nodiscard]] bool records(JobEventKind kind) const { return recorded_.contains(kind); }
+
   [[gnu::always_inline]] void emit(const Job &job, JobEventKind kind, std::int64_t value,
                                    Reason reason = Reason::None) {
     emit(job.task, job.number, job.worker, kind, value, reason);
   }
   [[gnu::always_inline]] void emit(TaskId task, std::uint32_t number, WorkerId worker, JobEventKind kind,
                                    std::int64_t value, Reason reason = Reason::None) {
-    if (recorded_.contains(kind)) record(JobEvent{now_, value, task, number, worker.value, kind, reason, 0});
+    if (records(kind)) record(JobEvent{now_, value, task, number, worker.value, kind, reason, 0});
   }
 
   [[gnu::always_inline]] void tell(const Job &job, JobSlot slot, DispatchKind kind, JobSlot over, std::uint32_t level) {
-    dispatches_.push_back(Dispatch{.job = slot,
-                                   .task = job.task,
-                                   .number = job.number,
-                                   .release = job.release,
-                                   .origin = job.origin,
-                                   .worker = job.worker,
-                                   .over = over,
-                                   .kind = kind,
-                                   .inherits = job.priority_of != job.task,
-                                   .level = level});
+    dispatches_.add(Dispatch{.job = slot,
+                             .task = job.task,
+                             .number = job.number,
+                             .release = job.release,
+                             .origin = job.origin,
+                             .worker = job.worker,
+                             .over = over,
+                             .kind = kind,
+                             .inherits = job.priority_of != job.task,
+                             .level = level});
   }
 
   /// Drops the changes of level that the step has for this job.
   void drop_level(JobSlot slot) {
-    std::erase_if(dispatches_, [slot](const Dispatch &d) { return d.kind == DispatchKind::Level && d.job == slot; });
+    dispatches_.remove_if([slot](const Dispatch &d) { return d.kind == DispatchKind::Level && d.job == slot; });
   }
 
   /// Drops all decisions that the step has for this job.
@@ -79,13 +117,13 @@ class StepBuilder {
   }
 
  private:
-  void record(const JobEvent &event) { events_.push_back(event); }
+  void record(const JobEvent &event) { events_.add(event); }
   [[gnu::noinline]] void drop_all(JobSlot slot) {
-    std::erase_if(dispatches_, [slot](const Dispatch &d) { return d.job == slot; });
+    dispatches_.remove_if([slot](const Dispatch &d) { return d.job == slot; });
   }
 
-  std::vector<JobEvent> events_;
-  std::vector<Dispatch> dispatches_;
+  StepEntries<JobEvent> events_;
+  StepEntries<Dispatch> dispatches_;
   EventKinds recorded_ = EventKinds::all();
   Time now_ = 0;
   bool was_read_ = false;
