@@ -30,9 +30,8 @@ namespace fs = std::filesystem;
 constexpr std::array<std::string_view, 4> kLibraries{"libddsc.so", "libfastrtps.so", "libfastdds.so", "libzenohc.so"};
 
 // Threads of these libraries that neither receive nor deliver: they free memory, or write logs. A name that ends with a
-// dot is followed by more. Cyclone DDS: q_gc.c, q_debmon.c,
-// dds_init.c. Fast DDS: Log.cpp, SharedMemLog.hpp, SharedMemWatchdog.hpp,
-// TypeLookupRequestListener.cpp.
+// dot is followed by more. Cyclone DDS: q_gc.c, q_debmon.c, dds_init.c. Fast DDS: Log.cpp, SharedMemLog.hpp,
+// SharedMemWatchdog.hpp, TypeLookupRequestListener.cpp.
 constexpr std::array<std::string_view, 7> kBackground{"gc",        "debmon",       "threadmon", "dds.log",
                                                       "dds.shmd.", "dds.shm.wdog", "dds.tls."};
 

@@ -316,6 +316,10 @@ TEST_P(MiddlewareTest, ThreadsAreRaisedWhileItSpins) {
     const NamedThread late("tev");
     EXPECT_TRUE(eventually([&] { return late.priority() == above_jobs(); }));
     EXPECT_TRUE(eventually([&] { return LogCapture::has("threads of rmw_") && LogCapture::has("tev"); }));
+    // So are those that appear with an entity, however long after the start.
+    const NamedThread with_entity("recvMC");
+    const auto subscription = subscribe("/topic", [] {});
+    EXPECT_TRUE(eventually([&] { return with_entity.priority() == above_jobs(); }));
   }
   EXPECT_EQ(middleware.policy(), SCHED_OTHER);
   EXPECT_EQ(user.policy(), SCHED_OTHER);
