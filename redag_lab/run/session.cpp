@@ -144,9 +144,9 @@ class Evaluation {
  private:
   void open_files() {
     if (files_options_.folder.empty()) return;
-    Result<RunFiles> files = RunFiles::create(files_options_, info_);
+    Result<metrics::RunFiles> files = metrics::RunFiles::create(files_options_, info_);
     if (files) {
-      files_ = std::make_unique<RunFiles>(*std::move(files));
+      files_ = std::make_unique<metrics::RunFiles>(*std::move(files));
     } else {
       problems_ = std::move(files.error());
     }
@@ -165,8 +165,8 @@ class Evaluation {
   Limit kept_limit_;
   bool keeps_;
   bool defers_;  // examines the events after the run
-  FilesOptions files_options_;
-  std::unique_ptr<RunFiles> files_;
+  metrics::FilesOptions files_options_;
+  std::unique_ptr<metrics::RunFiles> files_;
   Diagnostics problems_;
 };
 

@@ -20,9 +20,9 @@
 #include "redag/trace/trace.hpp"
 #include "redag_analysis/metrics/check_report.hpp"
 #include "redag_analysis/metrics/kernel_record.hpp"
+#include "redag_analysis/metrics/run_files.hpp"
 #include "redag_analysis/metrics/summary.hpp"
 #include "redag_analysis/sim/simulator.hpp"
-#include "redag_lab/run/run_files.hpp"
 #include "redag_lab/run/variant.hpp"
 
 namespace redag::lab {
@@ -38,7 +38,7 @@ struct SessionOptions {
   std::uint64_t seed = 1;
   /// Number of events that are checked and written, up to the end of an instant. Later events only enter the summary.
   std::uint64_t max_events = kMostKeptEvents;
-  FilesOptions files;                       // written while the run goes on, and completed by write_session()
+  metrics::FilesOptions files;              // written while the run goes on, and completed by write_session()
   bool keep_trace = true;                   // false: Session::trace has no events
   const std::atomic<bool> *stop = nullptr;  // ends the run early, with the results so far
   sim::Overheads overheads;                 // simulator
@@ -65,7 +65,7 @@ struct Session {
   std::uint64_t checked = 0;                    // its events that were checked and written; all of them unless cut_at
   std::optional<Time> cut_at;                   // `max_events` was reached: they are those of a run that ended here
   metrics::CheckReport check;                   // of these events
-  std::unique_ptr<RunFiles> files;              // of SessionOptions::files, not yet complete
+  std::unique_ptr<metrics::RunFiles> files;     // of SessionOptions::files, not yet complete
   std::optional<metrics::KernelRecord> kernel;  // of SessionOptions::kernel
   bool realtime_threads = false;                // the jobs ran on SCHED_FIFO threads
   std::uint64_t events = 0;                     // of the whole run

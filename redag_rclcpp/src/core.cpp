@@ -12,7 +12,9 @@
 #include <stdexcept>
 #include <utility>
 
+#include "middleware_report.hpp"
 #include "middleware_threads.hpp"
+#include "rcl/context.h"
 #include "rclcpp/logging.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/runtime/clock.hpp"
@@ -31,6 +33,7 @@ using std::chrono::nanoseconds;
 namespace {
 
 constexpr redag::Duration kNodesAppear = 3 * redag::kSecond;  // after the first start: until names should match
+constexpr redag::Duration kThreadsAppear = redag::kSecond;    // after a start or new entities: of the middleware
 
 rclcpp::Logger logger() { return rclcpp::get_logger("redag_rclcpp"); }
 
@@ -233,16 +236,23 @@ void ReDAGExecutor::Core::report_unmatched() {
   for (const std::string &line : registry_.unmatched()) RCLCPP_WARN(logger(), "%s", line.c_str());
 }
 
-void ReDAGExecutor::Core::note_middleware(const RaisedMiddleware &raised) {
-  std::string warning;
-  if (raised.found() == 0) {
-    warning = "the threads of this middleware are not known by name: give its receiving threads SCHED_FIFO priority " +
-              std::to_string(setup_.timer_priority()) + " yourself, or busy workers delay messages (see docs/ros2.md)";
-  } else if (raised.refused() > 0) {
-    warning =
-        fmt::format("{} threads of the middleware could not get a higher priority than the workers", raised.refused());
+// Logs what was found, if it differs from the last time. Threads can appear late: that there are none is reported only
+// when they are `due`.
+void ReDAGExecutor::Core::report(const RaisedMiddleware &middleware, bool due) {
+  if (middleware.found().threads.empty() && !due) return;
+  const rmw_context_t *const rmw = rcl_context_get_rmw_context(context_->get_rcl_context().get());
+  const MiddlewareReport report =
+      describe(middleware.found(),
+               {.rmw = rmw == nullptr || rmw->implementation_identifier == nullptr ? "the middleware"
+                                                                                   : rmw->implementation_identifier,
+                .wanted = middleware.priority(),
+                .top_job = setup_.band.top_job,
+                .timer = setup_.timer_priority()});
+  if (report.summary != middleware_summary_) RCLCPP_INFO(logger(), "%s", report.summary.c_str());
+  middleware_summary_ = report.summary;
+  for (const std::string &warning : report.warnings) {
+    if (notes_.warn(warning)) RCLCPP_WARN(logger(), "%s", warning.c_str());
   }
-  if (!warning.empty()) notes_.warn(std::move(warning));
 }
 
 void ReDAGExecutor::Core::watch_jobs() {
@@ -258,12 +268,13 @@ void ReDAGExecutor::Core::watch_jobs() {
 }
 
 void ReDAGExecutor::Core::spin() {
-  std::optional<RaisedMiddleware> raised;
-  if (setup_.timer_priority() > 0 && options_.raise_middleware) {
-    raised.emplace(setup_.timer_priority());
-    note_middleware(*raised);
-  }
+  std::optional<RaisedMiddleware> middleware;
+  if (setup_.timer_priority() > 0) middleware.emplace(options_.raise_middleware ? setup_.timer_priority() : 0);
   start();
+  if (middleware) {
+    report(*middleware, false);
+    look_at_middleware_at_ = engine_->now() + kThreadsAppear;
+  }
   registry_.collect();
   direct_ = true;
   timer_.resume();
@@ -283,7 +294,7 @@ void ReDAGExecutor::Core::spin() {
       Core &core;
       std::thread thread;
     } join{*this, *std::move(watcher)};
-    keep_house();
+    keep_house(middleware ? &*middleware : nullptr);
   } catch (...) {
     // One cause is a context that was shut down while entities were collected.
     stop_workers();
@@ -297,18 +308,28 @@ void ReDAGExecutor::Core::spin() {
 }
 
 // Work of spin() on the calling thread, at that thread's own priority: everything that takes long and is not urgent.
-void ReDAGExecutor::Core::keep_house() {
+void ReDAGExecutor::Core::keep_house(RaisedMiddleware *middleware) {
   while (hooks_.may_spin() && !wait_set_done_) {
-    if (registry_.is_stale()) registry_.collect();
+    const bool is_stale = registry_.is_stale();
+    if (is_stale) registry_.collect();
     const redag::Time now = engine_->now();
+    if (middleware != nullptr && now >= look_at_middleware_at_) {
+      look_at_middleware_at_ = kNever;
+      middleware->look();
+      report(*middleware, true);
+    }
+    // Entities can make the middleware create threads.
+    if (middleware != nullptr && is_stale && look_at_middleware_at_ == kNever) {
+      look_at_middleware_at_ = now + kThreadsAppear;
+    }
     if (learning_ && now >= learn_until_) stop_learning();
     if (now >= report_unmatched_at_) report_unmatched();
     if (looks_for_deadlocks_ && look_for_deadlocks_at_ == kNever) {
       look_for_deadlocks_at_ = now + DeadlockDetector::kInterval;
     }
     if (now >= look_for_deadlocks_at_) look_for_deadlocks();
-    const redag::Time next =
-        std::min({report_unmatched_at_, look_for_deadlocks_at_, learning_ ? learn_until_ : kNever});
+    const redag::Time next = std::min(
+        {report_unmatched_at_, look_at_middleware_at_, look_for_deadlocks_at_, learning_ ? learn_until_ : kNever});
     if (next == kNever) {
       keeper_parker_.park();
     } else if (next > now) {

@@ -89,10 +89,10 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
   [[nodiscard]] std::unique_ptr<redag::runtime::Engine> make_engine();
   void go_live();
   void start();
-  void note_middleware(const RaisedMiddleware &raised);
+  void report(const RaisedMiddleware &middleware, bool due);
   void watch_jobs();
   void report_unmatched();
-  void keep_house();
+  void keep_house(RaisedMiddleware *middleware);
   void look_for_deadlocks();
   [[nodiscard]] std::string alert() const;
   void watch_wait_set() noexcept;
@@ -123,6 +123,8 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
   std::atomic<bool> learning_{false};
   redag::Time learn_until_ = redag::kNever;
   redag::Time report_unmatched_at_ = redag::kNever;
+  redag::Time look_at_middleware_at_ = redag::kNever;
+  std::string middleware_summary_;  // what the log says last about the middleware's threads
   // There may be requests or responses that were not taken, or deadlocks that last. Only then does anyone look.
   std::atomic<bool> looks_for_deadlocks_{false};
   redag::Time look_for_deadlocks_at_ = redag::kNever;  // kNever: not before looks_for_deadlocks_

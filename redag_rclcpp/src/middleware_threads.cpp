@@ -12,17 +12,28 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
-#include <map>
+#include <optional>
 #include <sstream>
+#include <tuple>
 #include <utility>
 
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/mutex.hpp"
+#include "start_routines.hpp"
 
 namespace redag_rclcpp {
 namespace {
 
 namespace fs = std::filesystem;
+
+// libfastdds is Fast DDS 3.
+constexpr std::array<std::string_view, 4> kLibraries{"libddsc.so", "libfastrtps.so", "libfastdds.so", "libzenohc.so"};
+
+// Threads of these libraries that neither receive nor deliver: they free memory, or write logs. A name that ends with a
+// dot is followed by more. Cyclone DDS: q_gc.c, q_debmon.c, dds_init.c. Fast DDS: Log.cpp, SharedMemLog.hpp,
+// SharedMemWatchdog.hpp, TypeLookupRequestListener.cpp.
+constexpr std::array<std::string_view, 7> kBackground{"gc",        "debmon",       "threadmon", "dds.log",
+                                                      "dds.shmd.", "dds.shm.wdog", "dds.tls."};
 
 // Names in Cyclone DDS: q_init.c, q_radmin.c, q_xevent.c. dq.* deliver what recv* received; tev sends acknowledgements.
 constexpr std::array<std::string_view, 6> kCyclone{"recv", "recvMC", "recvUC", "dq.builtins", "dq.user", "tev"};
@@ -39,6 +50,29 @@ bool is_fast(std::string_view name) {
     const bool begins = name.size() > prefix.size() && name.substr(0, prefix.size()) == prefix;
     return begins && name.find_first_not_of("0123456789.", prefix.size()) == std::string_view::npos;
   });
+}
+
+bool works_in_background(std::string_view name) {
+  return std::any_of(kBackground.begin(), kBackground.end(), [&](std::string_view known) {
+    return known.back() == '.' ? name.substr(0, known.size()) == known : name == known;
+  });
+}
+
+/// Located once, because the place is the same for all threads of a process. Tried again after an error: there may have
+/// been too few threads for it.
+redag::Result<StartRoutines> start_routines() {
+  struct Located {
+    redag::Mutex lock;
+    std::optional<StartRoutines> routines REDAG_GUARDED_BY(lock);
+  };
+  static auto *const located = new Located;  // never destroyed: an executor may be a static object
+  const redag::LockGuard guard(located->lock);
+  if (!located->routines) {
+    redag::Result<StartRoutines> routines = StartRoutines::locate();
+    if (!routines) return routines;
+    located->routines = *routines;
+  }
+  return *located->routines;
 }
 
 fs::path folder_of(int thread) { return fs::path("/proc/self/task") / std::to_string(thread); }
@@ -106,63 +140,78 @@ Registry &registry() {
 
 }  // namespace
 
+bool is_middleware_library(std::string_view path) {
+  const std::string_view name = path.substr(path.rfind('/') + 1);
+  return std::any_of(kLibraries.begin(), kLibraries.end(),
+                     [&](std::string_view library) { return name.substr(0, library.size()) == library; });
+}
+
 bool is_middleware_thread_name(std::string_view name) { return is_cyclone(name) || is_fast(name); }
 
-std::vector<MiddlewareThread> find_middleware_threads() {
-  std::vector<MiddlewareThread> found;
+MiddlewareThreads find_middleware_threads() {
+  MiddlewareThreads found;
+  const redag::Result<StartRoutines> routines = start_routines();
+  if (!routines) found.by_names_because = routines.error().front().message;
+  const auto is_middleware = [&](const MiddlewareThread &thread) {
+    if (routines) return is_middleware_library(routines->library_of(thread.id));
+    return is_fast(thread.name) || (is_cyclone(thread.name) && blocks_signals(thread.id));
+  };
   std::error_code error;
   for (const auto &entry : fs::directory_iterator("/proc/self/task", error)) {
     const std::string id = entry.path().filename();
     MiddlewareThread thread;
     if (std::from_chars(id.data(), id.data() + id.size(), thread.id).ec != std::errc()) continue;
     std::ifstream file(entry.path() / "comm");
-    std::getline(file, thread.name);
-    if (is_fast(thread.name) || (is_cyclone(thread.name) && blocks_signals(thread.id))) {
-      found.push_back(std::move(thread));
-    }
+    if (!std::getline(file, thread.name) || !is_middleware(thread)) continue;
+    thread.delivers = !works_in_background(thread.name);
+    Scheduling now;
+    if (read_scheduling(thread.id, now) && now.is_realtime()) thread.priority = now.parameters.sched_priority;
+    found.threads.push_back(std::move(thread));
   }
+  std::sort(found.threads.begin(), found.threads.end(),
+            [](const auto &a, const auto &b) { return std::tie(a.name, a.id) < std::tie(b.name, b.id); });
   return found;
 }
 
-RaisedMiddleware::RaisedMiddleware(int priority) {
-  const std::vector<MiddlewareThread> threads = find_middleware_threads();
-  found_ = threads.size();
+void RaisedMiddleware::look() {
+  found_ = find_middleware_threads();
   const redag::LockGuard guard(registry().lock);
-  for (const MiddlewareThread &thread : threads) {
+  for (MiddlewareThread &thread : found_.threads) {
+    if (priority_ == 0 || !thread.delivers) continue;
     Scheduling now;
     const std::uint64_t start = start_of(thread.id);
     if (start == 0 || !read_scheduling(thread.id, now)) continue;  // the thread has ended
+    const auto mine = raised_.find(thread.id);
+    if (mine != raised_.end() && mine->second == start) continue;  // another part of the program may have lowered it
     auto known = registry().threads.find(thread.id);
     if (known != registry().threads.end() && known->second.start != start) {
       registry().threads.erase(known);  // the entry belongs to an ended thread of the same id
       known = registry().threads.end();
     }
-    if (!now.is_realtime() || now.parameters.sched_priority < priority) {
-      const sched_param wanted{priority};
-      if (sched_setscheduler(thread.id, SCHED_FIFO, &wanted) != 0) {
-        ++refused_;
-        continue;
-      }
+    if (!now.is_realtime() || now.parameters.sched_priority < priority_) {
+      const sched_param wanted{priority_};
+      if (sched_setscheduler(thread.id, SCHED_FIFO, &wanted) != 0) continue;  // its priority stays in found()
+      thread.priority = priority_;
       if (known == registry().threads.end()) {
-        known = registry().threads.emplace(thread.id, Raised{now, priority, start, 0}).first;
+        known = registry().threads.emplace(thread.id, Raised{now, priority_, start, 0}).first;
       }
-      known->second.priority = priority;
+      known->second.priority = priority_;
     }
     if (known == registry().threads.end()) continue;  // its own priority is high enough
     ++known->second.users;
-    raised_.push_back(thread.id);
+    raised_[thread.id] = start;
   }
 }
 
 RaisedMiddleware::~RaisedMiddleware() {
   const redag::LockGuard guard(registry().lock);
-  for (const int thread : raised_) {
+  for (const auto &[thread, start] : raised_) {
     const auto known = registry().threads.find(thread);
-    if (known == registry().threads.end() || --known->second.users > 0) continue;
+    if (known == registry().threads.end() || known->second.start != start || --known->second.users > 0) continue;
     const Raised raised = known->second;
     registry().threads.erase(known);
     Scheduling now;
-    if (start_of(thread) != raised.start || !read_scheduling(thread, now)) continue;
+    if (start_of(thread) != start || !read_scheduling(thread, now)) continue;
     // Leaves a priority in place that another part of the program has set meanwhile.
     if (now.policy != SCHED_FIFO || now.parameters.sched_priority != raised.priority) continue;
     (void)sched_setscheduler(thread, raised.before.policy, &raised.before.parameters);

@@ -327,17 +327,18 @@ redag::Result<void> Monitor::Impl::finish() {
   if (!options_.metrics_file.empty()) write_metrics(options_.metrics_file);
   if (has_trace) {
     write_metrics(options_.trace + "/metrics.json");
-    const redag::Diagnostics more = keeper_.write(options_.trace, executor_);
+    using redag::metrics::Picture;
+    redag::metrics::FilesOptions files{.folder = options_.trace, .events_as_text = options_.events_as_text};
+    if (options_.picture) files.picture = *options_.picture ? Picture::Always : Picture::Never;
+    const redag::Diagnostics more = keeper_.write(files, executor_);
     problems.insert(problems.end(), more.begin(), more.end());
     // Removes the flight record only if all results were written.
     if (problems.empty()) {
       if (const redag::Result<void> removed = flight_.remove(); !removed) problems = removed.error();
     }
     if (problems.empty()) {
-      RCLCPP_INFO(node_->get_logger(),
-                  "wrote %s: metrics.json, summary.json, jobs.csv, events.jsonl, trace.pftrace (open trace.pftrace in "
-                  "https://ui.perfetto.dev)",
-                  options_.trace.c_str());
+      RCLCPP_INFO(node_->get_logger(), "wrote %s: metrics.json, %s ('redag report %s' makes a page of them)",
+                  options_.trace.c_str(), keeper_.names().c_str(), options_.trace.c_str());
     }
   }
   if (!problems.empty()) return tl::unexpected<redag::Diagnostics>(std::move(problems));

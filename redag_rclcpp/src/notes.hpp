@@ -21,12 +21,12 @@ namespace redag_rclcpp {
 
 class Notes {
  public:
-  /// Adds a warning, unless there is the same already.
-  void warn(std::string warning) {
+  /// Adds a warning. False: there is the same already.
+  bool warn(std::string warning) {
     const redag::LockGuard guard(lock_);
-    if (std::find(warnings_.begin(), warnings_.end(), warning) == warnings_.end()) {
-      warnings_.push_back(std::move(warning));
-    }
+    if (std::find(warnings_.begin(), warnings_.end(), warning) != warnings_.end()) return false;
+    warnings_.push_back(std::move(warning));
+    return true;
   }
   [[nodiscard]] std::vector<std::string> warnings() const {
     const redag::LockGuard guard(lock_);

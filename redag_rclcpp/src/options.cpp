@@ -10,6 +10,7 @@
 #include <cmath>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "rclcpp/exceptions.hpp"
 #include "rclcpp/logging.hpp"
@@ -98,6 +99,17 @@ class Reader {
     const bool fits = number == 0 ? may_be_zero : number >= 1e-9 && number <= kMostSeconds;
     if (!fits) refuse(spec.name, value, spec.allowed);
     return nanoseconds(std::llround(number * 1e9));
+  }
+
+  /// The first word is the default.
+  std::string word(const char *name, const char *description, const std::vector<std::string> &words) {
+    const Spec spec{name, description, fmt::format("one of {}", fmt::join(words, ", "))};
+    const ParameterValue value = this->value(spec, ParameterValue(words.front()));
+    if (value.get_type() != ParameterType::PARAMETER_STRING) refuse(name, value, spec.allowed);
+    if (std::find(words.begin(), words.end(), value.get<std::string>()) == words.end()) {
+      refuse(name, value, spec.allowed);
+    }
+    return value.get<std::string>();
   }
 
   template <class Values>
@@ -195,10 +207,22 @@ bool has_all_wcets(const redag::Workload &workload) {
 std::string read_trace(Reader &reader) {
   return reader.text(
       {"trace",
-       "Folder for events.jsonl, jobs.csv, summary.json and trace.pftrace, which are written when spinning "
-       "ends; empty: none",
+       "Folder for events.redag, jobs.csv, summary.json and trace.pftrace, which are written when spinning ends; "
+       "empty: none",
        "the path of a folder"},
       "");
+}
+
+/// Names and values are those of the options of `redag run`.
+void read_forms(Reader &reader, MonitorOptions &options) {
+  options.events_as_text =
+      reader.word("events", "Form of the events of `trace`: events.redag (compressed), or events.jsonl (text)",
+                  {"redag", "jsonl"}) == "jsonl";
+  const std::string picture = reader.word(
+      "picture",
+      "Whether `trace` has trace.pftrace, the schedule as a picture; auto: if there are at most 500 000 events",
+      {"auto", "always", "never"});
+  if (picture != "auto") options.picture = picture == "always";
 }
 
 std::optional<redag::Calibration> read_overheads(Reader &reader) {
@@ -315,6 +339,7 @@ MonitorOptions declare_monitor_options(rclcpp::Node &node, const ReDAGOptions &e
       reader.text({"save_path", "File to which the service ~/save writes the learned workload", "the path of a file"},
                   options.save_path, false);
   options.trace = read_trace(reader);
+  read_forms(reader, options);
   options.trace_events = static_cast<std::size_t>(reader.integer(
       {"trace_events", "Number of events that are kept for `trace`, at 32 bytes each; later events are dropped",
        fmt::format("a whole number from 1 to {}", kMostTraceEvents)},

@@ -11,11 +11,7 @@
 #include <system_error>
 #include <utility>
 
-#include "redag/trace/events_file.hpp"
 #include "redag/trace/trace.hpp"
-#include "redag_analysis/metrics/jobs.hpp"
-#include "redag_analysis/metrics/jobs_csv.hpp"
-#include "redag_analysis/metrics/perfetto.hpp"
 #include "redag_analysis/metrics/summary_json.hpp"
 
 namespace redag_rclcpp {
@@ -36,7 +32,7 @@ void TraceKeeper::add(const std::vector<redag::JobEvent> &events) {
   if (events.size() > room) is_cut_ = true;
 }
 
-redag::Diagnostics TraceKeeper::write(const std::string &folder, const ReDAGExecutor &executor) {
+redag::Diagnostics TraceKeeper::write(const redag::metrics::FilesOptions &files, const ReDAGExecutor &executor) {
   redag::Diagnostics problems;
   const auto keep = [&problems](const redag::Result<void> &written) {
     if (!written) problems.insert(problems.end(), written.error().begin(), written.error().end());
@@ -46,11 +42,13 @@ redag::Diagnostics TraceKeeper::write(const std::string &folder, const ReDAGExec
   if (is_cut_ && !trace.events.empty()) trace.info.end = trace.events.back().time;
 
   const redag::metrics::Summary summary = redag::metrics::summarize(trace);
-  keep(redag::metrics::write_summary(folder + "/summary.json", summary, trace.info));
-  keep(redag::metrics::write_jobs_csv(folder + "/jobs.csv", trace.info.workload,
-                                      redag::metrics::fold_jobs(trace.info.workload, trace.events)));
-  keep(redag::metrics::write_perfetto(folder + "/trace.pftrace", trace));
-  keep(redag::trace::write_trace(folder + "/events.jsonl", trace));
+  keep(redag::metrics::write_summary(files.folder + "/summary.json", summary, trace.info));
+  redag::Result<std::string> names = redag::metrics::write_run_files(files, trace);
+  if (names) {
+    names_ = "summary.json, " + *names;
+  } else {
+    problems.insert(problems.end(), names.error().begin(), names.error().end());
+  }
   return problems;
 }
 

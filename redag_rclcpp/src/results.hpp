@@ -13,6 +13,7 @@
 #include "redag/base/result.hpp"
 #include "redag/model/job_event.hpp"
 #include "redag/trace/flight_recorder.hpp"
+#include "redag_analysis/metrics/run_files.hpp"
 #include "redag_rclcpp/executor.hpp"
 
 namespace redag_rclcpp {
@@ -27,9 +28,12 @@ class TraceKeeper {
   /// Keeps events until `most_events` is reached. Later events only set is_cut().
   void add(const std::vector<redag::JobEvent> &events);
 
-  /// Writes summary.json, jobs.csv, trace.pftrace and events.jsonl (docs/results_format.md). Call it after spinning.
-  /// Returns all problems.
-  [[nodiscard]] redag::Diagnostics write(const std::string &folder, const ReDAGExecutor &executor);
+  /// Writes summary.json, jobs.csv, the events, and the picture if there is to be one (docs/results_format.md). Call it
+  /// after spinning. Returns all problems.
+  [[nodiscard]] redag::Diagnostics write(const redag::metrics::FilesOptions &files, const ReDAGExecutor &executor);
+
+  /// The names of the files that were written: "summary.json, jobs.csv, events.redag".
+  [[nodiscard]] const std::string &names() const { return names_; }
 
   [[nodiscard]] std::size_t size() const { return events_.size(); }
   /// True if there were more events than could be kept.
@@ -38,6 +42,7 @@ class TraceKeeper {
  private:
   std::size_t most_;
   bool is_cut_ = false;
+  std::string names_;
   std::vector<redag::JobEvent> events_;
 };
 

@@ -3,9 +3,7 @@
 
 #include "thread_wait.hpp"
 
-#include <fcntl.h>
 #include <sys/syscall.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -16,17 +14,10 @@
 #include <future>
 #include <memory>
 
+#include "own_memory.hpp"
+
 namespace redag_rclcpp {
 namespace {
-
-/// Reads a file of /proc from `offset`. Returns the number of bytes read; negative: it cannot be read.
-ssize_t read_file(const char *path, void *buffer, std::size_t size, off_t offset) noexcept {
-  const int descriptor = ::open(path, O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) return -1;
-  const ssize_t count = ::pread(descriptor, buffer, size, offset);
-  ::close(descriptor);
-  return count;
-}
 
 /// The first word of the state that a promise shares with its futures: the address of the table of the state's virtual
 /// functions. It is the same for promises of all types in a process, and no other object that threads wait for has it.
@@ -49,7 +40,7 @@ bool belongs_to_promise(std::uintptr_t word) noexcept {
   if (word < kBefore) return false;
   static const void *const kMark = find_mark_of_promises();
   const void *first = nullptr;
-  const ssize_t count = read_file("/proc/self/mem", &first, sizeof(first), static_cast<off_t>(word - kBefore));
+  const ssize_t count = read_own_memory(word - kBefore, &first, sizeof(first));
   return count == static_cast<ssize_t>(sizeof(first)) && first == kMark;
 }
 

@@ -255,7 +255,7 @@ TEST_F(ContainerTest, ComponentsRunAndResultsAreWrittenAtTheEnd) {
   for (const char *name : {"summary.json", "jobs.csv", "trace.pftrace", "metrics.json"}) {
     EXPECT_TRUE(std::filesystem::exists(results / name)) << name;
   }
-  const auto trace = redag::trace::read_trace(results / "events.jsonl");
+  const auto trace = redag::trace::read_trace(results / "events.redag");
   ASSERT_TRUE(trace) << to_string(trace.error());
   const auto check = redag::metrics::check_trace(*trace, redag::metrics::rules_for(trace->info));
   EXPECT_TRUE(check.ok()) << check.to_string();

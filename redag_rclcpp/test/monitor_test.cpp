@@ -6,17 +6,15 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <rcutils/logging.h>
 
 #include <atomic>
-#include <cstdarg>
 #include <filesystem>
 #include <fstream>
-#include <mutex>
 #include <nlohmann/json.hpp>
 #include <thread>
 
 #include "diagnostic_msgs/msg/diagnostic_array.hpp"
+#include "log_capture.hpp"
 #include "monitor_test.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "redag/model/workload_yaml.hpp"
@@ -36,45 +34,6 @@ using diagnostic_msgs::msg::DiagnosticArray;
 using redag::kMillisecond;
 using ::testing::HasSubstr;
 using Json = nlohmann::json;
-
-// Collects the log messages of its lifetime.
-class LogCapture {
- public:
-  LogCapture() : before_(rcutils_logging_get_output_handler()) {
-    lines().clear();
-    rcutils_logging_set_output_handler(&keep);
-  }
-  ~LogCapture() { rcutils_logging_set_output_handler(before_); }
-
-  [[nodiscard]] static int warnings_with(const std::string &text) {
-    const std::lock_guard guard(lock());
-    return static_cast<int>(std::count_if(
-        lines().begin(), lines().end(), [&](const std::string &line) { return line.find(text) != std::string::npos; }));
-  }
-
- private:
-  static std::vector<std::string> &lines() {
-    static std::vector<std::string> lines;
-    return lines;
-  }
-  static std::mutex &lock() {
-    static std::mutex lock;
-    return lock;
-  }
-  static void keep(const rcutils_log_location_t *, int severity, const char *, rcutils_time_point_value_t,
-                   const char *format, va_list *arguments) {
-    if (severity < RCUTILS_LOG_SEVERITY_WARN) return;
-    char text[2048];
-    va_list copy;
-    va_copy(copy, *arguments);
-    vsnprintf(text, sizeof(text), format, copy);
-    va_end(copy);
-    const std::lock_guard guard(lock());
-    lines().emplace_back(text);
-  }
-
-  rcutils_logging_output_handler_t before_;
-};
 
 class MonitorTest : public ::testing::Test {
  protected:
@@ -289,7 +248,7 @@ TEST_F(MonitorTest, ResultsAreWrittenWhenSpinningHasEnded) {
   ASSERT_TRUE(done) << to_string(done.error());
 
   const std::filesystem::path results = monitor_options_.trace;
-  const auto trace = redag::trace::read_trace(results / "events.jsonl");
+  const auto trace = redag::trace::read_trace(results / "events.redag");
   ASSERT_TRUE(trace) << to_string(trace.error());
   EXPECT_GT(trace->events.size(), 20U);
   EXPECT_EQ(trace->info.lost_events, 0U);
@@ -335,6 +294,8 @@ TEST_F(MonitorTest, ATraceThatIsTooLongEndsEarlier) {
   options_.trace_capacity = 1 << 14;
   monitor_options_.trace = folder_ / "results";
   monitor_options_.trace_events = 25;
+  monitor_options_.events_as_text = true;
+  monitor_options_.picture = false;
   add_timer(10ms, [] {});
   start();
   ASSERT_TRUE(eventually([] { return LogCapture::warnings_with("the trace ends here, after 25 events") == 1; }));
@@ -343,6 +304,9 @@ TEST_F(MonitorTest, ATraceThatIsTooLongEndsEarlier) {
   const auto trace = redag::trace::read_trace(folder_ / "results" / "events.jsonl");
   ASSERT_TRUE(trace) << to_string(trace.error());
   EXPECT_EQ(trace->events.size(), 25U);
+  for (const char *name : {"events.redag", "trace.pftrace"}) {
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "results" / name)) << name;
+  }
   EXPECT_EQ(trace->info.end, trace->events.back().time);
 }
 

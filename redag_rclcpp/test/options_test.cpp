@@ -96,6 +96,8 @@ TEST_F(OptionsTest, Defaults) {
   const MonitorOptions monitor = declare_monitor_options(*node, options);
   EXPECT_EQ(monitor.period, 1s);
   EXPECT_EQ(monitor.trace, "");
+  EXPECT_FALSE(monitor.events_as_text);
+  EXPECT_FALSE(monitor.picture);
   EXPECT_EQ(monitor.metrics_file, "");
   EXPECT_FALSE(monitor.workload);
 }
@@ -118,6 +120,8 @@ TEST_F(OptionsTest, ValuesAreRead) {
                                {"live", false},
                                {"trace", "results"},
                                {"metrics_period", 0.25},
+                               {"events", "jsonl"},
+                               {"picture", "never"},
                                {"trace_events", 10},
                                {"metrics_file", "m.json"},
                                {"save_path", "s.yaml"}});
@@ -141,6 +145,8 @@ TEST_F(OptionsTest, ValuesAreRead) {
   const MonitorOptions monitor = declare_monitor_options(*node, options);
   EXPECT_EQ(monitor.period, 250ms);
   EXPECT_EQ(monitor.trace, "results");
+  EXPECT_TRUE(monitor.events_as_text);
+  EXPECT_EQ(monitor.picture, false);
   EXPECT_EQ(monitor.trace_events, 10U);
   EXPECT_EQ(monitor.metrics_file, "m.json");
   EXPECT_EQ(monitor.save_path, "s.yaml");
@@ -208,6 +214,9 @@ TEST_F(OptionsTest, MistakesSayWhichParameterWhatItIsAndWhatIsAllowed) {
               AllOf(HasSubstr("'raise_middleware'"), HasSubstr("true or false")));
   EXPECT_THAT(mistake_with({{"bounds", "yes"}}), AllOf(HasSubstr("'bounds'"), HasSubstr("true or false")));
   EXPECT_THAT(mistake_with({{"trace", 3}}), AllOf(HasSubstr("'trace'"), HasSubstr("folder")));
+  EXPECT_THAT(mistake_with({{"events", "csv"}}),
+              AllOf(HasSubstr("'events'"), HasSubstr("csv"), HasSubstr("redag, jsonl")));
+  EXPECT_THAT(mistake_with({{"picture", true}}), AllOf(HasSubstr("'picture'"), HasSubstr("auto, always, never")));
   EXPECT_THAT(mistake_with({{"trace_events", 0}}), AllOf(HasSubstr("'trace_events'"), HasSubstr("from 1")));
   EXPECT_THAT(mistake_with({{"metrics_period", std::numeric_limits<double>::quiet_NaN()}}),
               AllOf(HasSubstr("'metrics_period'"), HasSubstr("nan")));
@@ -280,7 +289,7 @@ TEST_F(OptionsTest, AnyValuesAreReadOrRefused) {
   const std::vector<std::string> names{
       "workers",        "preemption",   "policy",           "ties",      "threads",        "cpu_affinity", "config",
       "default_period", "learn",        "raise_middleware", "live",      "metrics_period", "trace",        "bounds",
-      "trace_events",   "metrics_file", "save_path",        "overheads", "deadlocks"};
+      "trace_events",   "metrics_file", "save_path",        "overheads", "deadlocks",      "events",       "picture"};
   const std::string workload = file_with(kWorkload);
   const std::uint64_t seed = from_environment("REDAG_SEED", 1);
   const std::uint64_t rounds = from_environment("REDAG_OPTION_ROUNDS", 400);
@@ -329,9 +338,11 @@ TEST_F(OptionsTest, ParametersSayWhatTheyAreAndStay) {
   const auto node = node_with({});
   const ReDAGOptions options = declare_options(*node);
   (void)declare_monitor_options(*node, options);
-  for (const char *name : {"workers", "preemption", "policy", "ties", "threads", "cpu_affinity", "config",
-                           "default_period", "learn", "raise_middleware", "lock_memory", "spin", "watchdog",
-                           "metrics_period", "trace", "bounds", "trace_events", "metrics_file", "save_path"}) {
+  for (const char *name : {"workers",      "preemption", "policy",         "ties",           "threads",
+                           "cpu_affinity", "config",     "default_period", "learn",          "raise_middleware",
+                           "lock_memory",  "spin",       "watchdog",       "metrics_period", "trace",
+                           "events",       "picture",    "bounds",         "trace_events",   "metrics_file",
+                           "save_path"}) {
     const auto descriptor = node->describe_parameter(name);
     EXPECT_FALSE(descriptor.description.empty()) << name;
     EXPECT_FALSE(descriptor.additional_constraints.empty()) << name;

@@ -1,11 +1,10 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Tests what the executor requests from Linux: priorities of its own threads and of the middleware's, locked memory,
-// and threads. Includes threads that cannot be created, and jobs that do not end.
+// Tests what the executor requests from Linux: priorities of its own threads, locked memory, and threads. Includes
+// threads that cannot be created, and jobs that do not end.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <rcutils/logging.h>
 #include <sched.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
@@ -14,9 +13,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <csignal>
-#include <cstdarg>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -28,10 +24,9 @@
 #include <vector>
 
 #include "any_waitable.hpp"
-#include "middleware_threads.hpp"
+#include "log_capture.hpp"
 #include "mode_test.hpp"
 #include "rclcpp/waitable.hpp"
-#include "redag/base/lock_guard.hpp"
 #include "redag/runtime/parker.hpp"
 #include "redag/runtime/threads.hpp"
 #include "spinning.hpp"
@@ -44,121 +39,6 @@ using redag::runtime::Event;
 using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
-
-// ---- threads of the middleware ----
-
-TEST(MiddlewareThreads, AreKnownByTheirWholeNames) {
-  for (const char *name : {"recv", "recvMC", "recvUC", "dq.builtins", "dq.user", "tev", "dds.udp.7411", "dds.shm.7410",
-                           "dds.ev.12", "dds.asyn.1.1", "dds.tcp_accept"}) {
-    EXPECT_TRUE(is_middleware_thread_name(name)) << name;
-  }
-  for (const char *name : {"recv_camera", "recvLidar", "receiver", "dq.", "dq.control", "tevent", "tev.mine", "dds.",
-                           "dds.logger", "dds.udp.", "dds.shm.wdog", "dds.udp.lidar", "redag-timer", ""}) {
-    EXPECT_FALSE(is_middleware_thread_name(name)) << name;
-  }
-}
-
-/// A user's thread with this name.
-class NamedThread {
- public:
-  NamedThread(const char *name, bool blocks_signals)
-      : thread_([this, name, blocks_signals] {
-          pthread_setname_np(pthread_self(), name);
-          sigset_t all;
-          sigfillset(&all);
-          if (blocks_signals) pthread_sigmask(SIG_BLOCK, &all, nullptr);
-          id_ = static_cast<int>(syscall(SYS_gettid));
-          ready_.set();
-          end_.wait();
-        }) {
-    ready_.wait();
-  }
-  ~NamedThread() {
-    end_.set();
-    thread_.join();
-  }
-  NamedThread(const NamedThread &) = delete;
-  NamedThread &operator=(const NamedThread &) = delete;
-
-  [[nodiscard]] int id() const { return id_; }
-  [[nodiscard]] int policy() const { return sched_getscheduler(id_); }
-  [[nodiscard]] int priority() const {
-    sched_param parameters{};
-    return sched_getparam(id_, &parameters) == 0 ? parameters.sched_priority : -1;
-  }
-  void set(int policy, int priority) const {
-    const sched_param parameters{priority};
-    EXPECT_EQ(sched_setscheduler(id_, policy, &parameters), 0);
-  }
-
- private:
-  Event ready_;
-  Event end_;
-  int id_ = 0;
-  std::thread thread_;
-};
-
-TEST(MiddlewareThreads, AUsersThreadOfTheSameNameIsNotOne) {
-  const NamedThread user("recv", false);
-  const NamedThread middleware("recv", true);
-  std::vector<int> found;
-  for (const MiddlewareThread &thread : find_middleware_threads()) found.push_back(thread.id);
-  EXPECT_THAT(found, Contains(middleware.id()));
-  EXPECT_THAT(found, ::testing::Not(Contains(user.id())));
-}
-
-class RaisedThreads : public ::testing::Test {
- protected:
-  void SetUp() override {
-    if (redag::runtime::available_fifo_priority(90) < 90) GTEST_SKIP() << "SCHED_FIFO is not to be had here";
-  }
-};
-
-TEST_F(RaisedThreads, GetBackWhatTheyHad) {
-  const NamedThread ordinary("recv", true);
-  const NamedThread batch("tev", true);
-  batch.set(SCHED_BATCH, 0);
-  const NamedThread low("dq.user", true);
-  low.set(SCHED_RR, 10);
-  const NamedThread high("recvUC", true);
-  high.set(SCHED_FIFO, 95);
-  {
-    const RaisedMiddleware raised(90);
-    EXPECT_GE(raised.found(), 4U);
-    EXPECT_EQ(raised.refused(), 0U);
-    for (const NamedThread *thread : {&ordinary, &batch, &low}) {
-      EXPECT_EQ(thread->policy(), SCHED_FIFO);
-      EXPECT_EQ(thread->priority(), 90);
-    }
-    EXPECT_EQ(high.priority(), 95);
-  }
-  EXPECT_EQ(ordinary.policy(), SCHED_OTHER);
-  EXPECT_EQ(batch.policy(), SCHED_BATCH);
-  EXPECT_EQ(low.policy(), SCHED_RR);
-  EXPECT_EQ(low.priority(), 10);
-  EXPECT_EQ(high.priority(), 95);
-}
-
-TEST_F(RaisedThreads, StayRaisedUntilTheLastExecutorIsDone) {
-  const NamedThread thread("recv", true);
-  auto first = std::make_unique<RaisedMiddleware>(40);
-  auto second = std::make_unique<RaisedMiddleware>(90);
-  EXPECT_EQ(thread.priority(), 90);
-  first.reset();
-  EXPECT_EQ(thread.priority(), 90);
-  second.reset();
-  EXPECT_EQ(thread.policy(), SCHED_OTHER);
-}
-
-TEST_F(RaisedThreads, KeepAPriorityThatSomebodyElseGaveThem) {
-  const NamedThread thread("recv", true);
-  {
-    const RaisedMiddleware raised(90);
-    thread.set(SCHED_FIFO, 33);
-  }
-  EXPECT_EQ(thread.policy(), SCHED_FIFO);
-  EXPECT_EQ(thread.priority(), 33);
-}
 
 // ---- the executor's threads ----
 
@@ -242,21 +122,6 @@ TEST_P(RealtimeTest, CancelTakesEffectWhileJobsUseTheProcessor) {
   spinning.join();
   EXPECT_GE(calls, kBefore);
   EXPECT_LT(calls, 10 * kBefore) << "the cancel() waited for jobs to leave the processor";
-}
-
-TEST_P(RealtimeTest, ThreadsOfTheMiddlewareAreRaisedWhileItSpins) {
-  if (GetParam() != redag::PreemptionMode::Os) GTEST_SKIP() << "workers have no priority";
-  const NamedThread user("recv_camera", true);
-  const NamedThread middleware("recv", true);
-  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
-  executor.add_node(node);
-  {
-    const Spinner spinner(executor);
-    EXPECT_TRUE(eventually([&] { return middleware.priority() == above_jobs(); }));
-    EXPECT_EQ(user.policy(), SCHED_OTHER);
-  }
-  EXPECT_EQ(middleware.policy(), SCHED_OTHER);
-  EXPECT_EQ(user.policy(), SCHED_OTHER);
 }
 
 TEST_P(RealtimeTest, ASpinAfterOneThatHadNoThreadsWorks) {
@@ -343,47 +208,6 @@ TEST_P(RealtimeTest, LockedMemoryIsThereBeforeCallbacksNeedIt) {
 }
 
 // ---- jobs that do not end ----
-
-/// Collects the log messages of its lifetime.
-class LogCapture {
- public:
-  LogCapture() : before_(rcutils_logging_get_output_handler()) {
-    const redag::LockGuard guard(lock());
-    lines().clear();
-    rcutils_logging_set_output_handler(&keep);
-  }
-  ~LogCapture() { rcutils_logging_set_output_handler(before_); }
-  LogCapture(const LogCapture &) = delete;
-  LogCapture &operator=(const LogCapture &) = delete;
-
-  [[nodiscard]] static bool has(const std::string &text) {
-    const redag::LockGuard guard(lock());
-    return std::any_of(lines().begin(), lines().end(),
-                       [&](const std::string &line) { return line.find(text) != std::string::npos; });
-  }
-
- private:
-  static redag::PiMutex &lock() {
-    static redag::PiMutex lock;
-    return lock;
-  }
-  static std::vector<std::string> &lines() {
-    static std::vector<std::string> lines;
-    return lines;
-  }
-  static void keep(const rcutils_log_location_t *, int, const char *, rcutils_time_point_value_t, const char *format,
-                   va_list *arguments) {
-    char text[1024];
-    va_list copy;
-    va_copy(copy, *arguments);
-    std::vsnprintf(text, sizeof text, format, copy);
-    va_end(copy);
-    const redag::LockGuard guard(lock());
-    lines().emplace_back(text);
-  }
-
-  rcutils_logging_output_handler_t before_;
-};
 
 TEST_P(RealtimeTest, TheWatchdogNamesACallbackThatDoesNotEnd) {
   options.watchdog = 30ms;

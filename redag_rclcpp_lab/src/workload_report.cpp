@@ -11,9 +11,7 @@
 #include "redag/base/text.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/output_file.hpp"
-#include "redag_analysis/metrics/jobs.hpp"
-#include "redag_analysis/metrics/jobs_csv.hpp"
-#include "redag_analysis/metrics/perfetto.hpp"
+#include "redag_analysis/metrics/run_files.hpp"
 #include "redag_analysis/metrics/summary_json.hpp"
 #include "redag_analysis/text/table.hpp"
 #include "workload_run.hpp"
@@ -73,11 +71,10 @@ redag::Diagnostics write_results(const WorkloadRun &run, const std::string &fold
   };
   const redag::trace::Trace &trace = run.trace;
   keep(redag::metrics::write_summary(folder + "/summary.json", run.summary, trace.info));
-  keep(redag::metrics::write_jobs_csv(folder + "/jobs.csv", trace.info.workload,
-                                      redag::metrics::fold_jobs(trace.info.workload, trace.events)));
-  keep(redag::metrics::write_perfetto(folder + "/trace.pftrace", trace));
-  keep(redag::trace::write_trace(folder + "/events.jsonl", trace));
-  if (run.scheduler) keep(redag::trace::write_trace(folder + "/scheduler_events.jsonl", run.scheduler->trace));
+  if (const auto written = redag::metrics::write_run_files({.folder = folder}, trace); !written) {
+    problems.insert(problems.end(), written.error().begin(), written.error().end());
+  }
+  if (run.scheduler) keep(redag::trace::write_trace(folder + "/scheduler_events.redag", run.scheduler->trace));
   keep(write_check(folder + "/check.json", run));
   return problems;
 }

@@ -54,8 +54,8 @@ struct WorkloadRun {
 [[nodiscard]] redag::Result<WorkloadRun> run_as_nodes(const redag::Workload &workload,
                                                       const WorkloadRunOptions &options);
 
-/// Writes jobs.csv, summary.json, trace.pftrace, events.jsonl, check.json with the verdicts, and for ReDAGExecutor
-/// scheduler_events.jsonl. Returns all problems.
+/// Writes jobs.csv, summary.json, events.redag, of short runs trace.pftrace, check.json with the verdicts, and for
+/// ReDAGExecutor scheduler_events.redag. Returns all problems.
 [[nodiscard]] redag::Diagnostics write_results(const WorkloadRun &run, const std::string &folder);
 
 /// The run as text: a table of tasks, a table of DAGs, and the verdicts.

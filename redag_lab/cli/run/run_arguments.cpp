@@ -91,8 +91,8 @@ void add_result_arguments(CLI::App &app, RunArguments &arguments) {
              "Form of the events: events.redag (compressed), or events.jsonl (text)")
       ->needs(folder)
       ->group(kResultGroup);
-  const Choices<lab::Picture> pictures{
-      {"auto", lab::Picture::Auto}, {"always", lab::Picture::Always}, {"never", lab::Picture::Never}};
+  const Choices<metrics::Picture> pictures{
+      {"auto", metrics::Picture::Auto}, {"always", metrics::Picture::Always}, {"never", metrics::Picture::Never}};
   add_choice(app, "--picture", arguments.picture, pictures,
              "Write trace.pftrace, the schedule as a picture (auto: of runs with at most 500 000 events)")
       ->needs(folder)
@@ -253,7 +253,7 @@ std::optional<lab::SessionOptions> session_options(const RunArguments &arguments
   return options;
 }
 
-lab::FilesOptions files_options(const RunArguments &arguments, const std::string &folder) {
+metrics::FilesOptions files_options(const RunArguments &arguments, const std::string &folder) {
   return {.folder = folder, .events_as_text = arguments.events_as_text, .picture = arguments.picture};
 }
 

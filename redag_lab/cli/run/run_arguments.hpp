@@ -43,7 +43,7 @@ struct RunArguments {
   bool json = false;
   std::string folder;
   bool events_as_text = false;
-  lab::Picture picture = lab::Picture::Auto;
+  metrics::Picture picture = metrics::Picture::Auto;
   bool kernel = false;
   bool flight = false;  // records the run in `folder` while it runs
   std::uint32_t flight_mib = static_cast<std::uint32_t>(trace::FlightOptions{}.most_bytes >> 20U);
@@ -83,7 +83,7 @@ void add_thread_arguments(CLI::App &app, RunArguments &arguments);
 
 /// Draws `progress` over a session of `duration`: the time, and the DAGs with misses.
 /// The files that a run writes into `folder`; "": none.
-[[nodiscard]] lab::FilesOptions files_options(const RunArguments &arguments, const std::string &folder);
+[[nodiscard]] metrics::FilesOptions files_options(const RunArguments &arguments, const std::string &folder);
 
 [[nodiscard]] lab::ProgressHook progress_hook(Progress &progress, const Workload &workload, Duration duration);
 

@@ -241,7 +241,7 @@ Json to_json(const lab::Session &session) {
   return document;
 }
 
-WrittenFiles write_session(lab::Session &session, const lab::FilesOptions &options) {
+WrittenFiles write_session(lab::Session &session, const metrics::FilesOptions &options) {
   WrittenFiles written;
   const auto keep = [&written](const Diagnostics &problems) {
     written.problems.insert(written.problems.end(), problems.begin(), problems.end());
@@ -250,10 +250,10 @@ WrittenFiles write_session(lab::Session &session, const lab::FilesOptions &optio
     if (!result) keep(result.error());
   };
   if (!session.files) {
-    Result<lab::RunFiles> files = lab::RunFiles::create(options, session.trace.info);
+    Result<metrics::RunFiles> files = metrics::RunFiles::create(options, session.trace.info);
     if (files) {
       files->add(session.trace.events);
-      session.files = std::make_unique<lab::RunFiles>(*std::move(files));
+      session.files = std::make_unique<metrics::RunFiles>(*std::move(files));
     } else {
       keep(files.error());
     }
@@ -267,7 +267,7 @@ WrittenFiles write_session(lab::Session &session, const lab::FilesOptions &optio
       written.no_picture = fmt::format(
           "no trace.pftrace: the run has more than {0} events\n"
           "('redag events {1} --format perfetto -o {1}/trace.pftrace' makes one)\n",
-          format_count(lab::kMostPicturedEvents), options.folder);
+          format_count(metrics::kMostPicturedEvents), options.folder);
     }
   }
   if (session.kernel) {

@@ -37,6 +37,6 @@ struct WrittenFiles {
 
 /// Completes session.files, or writes such files of session.trace, and adds summary.json and kernel.jsonl. The folder
 /// must exist. Continues after a failure.
-[[nodiscard]] WrittenFiles write_session(lab::Session &session, const lab::FilesOptions &options);
+[[nodiscard]] WrittenFiles write_session(lab::Session &session, const metrics::FilesOptions &options);
 
 }  // namespace redag::cli

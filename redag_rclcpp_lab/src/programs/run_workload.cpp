@@ -75,7 +75,7 @@ is a miss. Ctrl-C ends the run early and shows the results so far.
 Examples:
   ros2 run redag_rclcpp_lab run_workload workloads/hello.yaml --executor mte,ste
   ros2 run redag_rclcpp_lab run_workload workloads/hello.yaml --out results
-  redag check-trace results/scheduler_events.jsonl
+  redag check-trace results/scheduler_events.redag
 
 Exit status: 0 success; 1 a trace breaks rules of the model; 2 bad input, or
 the machine or ROS 2 refused the run.
@@ -374,7 +374,7 @@ int compare(const redag::Workload &workload, const Arguments &arguments, const s
       fmt::print(stderr, "{} of {}: {}\n", repetition + 1, arguments.repeat, executor);
       const std::string place = fmt::format("{}/{}/{}", folder, executor, repetition + 1);
       const int status = run_child(arguments, executor, place);
-      const redag::Result<redag::trace::Trace> trace = redag::trace::read_trace(place + "/events.jsonl");
+      const redag::Result<redag::trace::Trace> trace = redag::trace::read_trace(place + "/events.redag");
       if (status == kExitBad || !trace) {
         fmt::print(stderr, "error: the run with executor {} failed\n", executor);
         if (status != kExitBad) note(trace.error());

@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_lab/run/run_files.hpp"
+#include "redag_analysis/metrics/run_files.hpp"
 
 #include <filesystem>
 #include <system_error>
 #include <utility>
 
-namespace redag::lab {
+namespace redag::metrics {
 namespace {
 
 constexpr std::string_view kJobsFile = "jobs.csv";
@@ -21,11 +21,11 @@ Result<RunFiles> RunFiles::create(const FilesOptions &options, const trace::RunI
   const auto path = [&](std::string_view name) { return options.folder + "/" + std::string(name); };
   auto events = trace::EventsWriter::create(path(events_name(options.events_as_text)), run);
   if (!events) return tl::unexpected<Diagnostics>(std::move(events.error()));
-  auto jobs = metrics::JobsCsvWriter::create(path(kJobsFile), run.workload);
+  auto jobs = JobsCsvWriter::create(path(kJobsFile), run.workload);
   if (!jobs) return tl::unexpected<Diagnostics>(std::move(jobs.error()));
   RunFiles files(options, run, *std::move(events), *std::move(jobs));
   if (options.picture == Picture::Never) return files;
-  auto picture = metrics::PerfettoWriter::create(path(kPictureFile), *files.run_);
+  auto picture = PerfettoWriter::create(path(kPictureFile), *files.run_);
   if (!picture) return tl::unexpected<Diagnostics>(std::move(picture.error()));
   files.picture_.emplace(*std::move(picture));
   return files;
@@ -72,4 +72,13 @@ std::string RunFiles::names() const {
   return names;
 }
 
-}  // namespace redag::lab
+Result<std::string> write_run_files(const FilesOptions &options, const trace::Trace &trace) {
+  Result<RunFiles> files = RunFiles::create(options, trace.info);
+  if (!files) return tl::unexpected<Diagnostics>(std::move(files.error()));
+  files->add(trace.events);
+  Diagnostics problems = files->commit(trace.info.end, trace.info.lost_events);
+  if (!problems.empty()) return tl::unexpected<Diagnostics>(std::move(problems));
+  return files->names();
+}
+
+}  // namespace redag::metrics

@@ -19,7 +19,7 @@
 #include "redag_analysis/metrics/jobs_csv.hpp"
 #include "redag_analysis/metrics/perfetto.hpp"
 
-namespace redag::lab {
+namespace redag::metrics {
 
 /// Which runs get a picture.
 enum class Picture : std::uint8_t {
@@ -58,7 +58,7 @@ class RunFiles {
   [[nodiscard]] bool lacks_picture() const { return lacks_picture_; }
 
  private:
-  RunFiles(FilesOptions options, const trace::RunInfo &run, trace::EventsWriter events, metrics::JobsCsvWriter jobs)
+  RunFiles(FilesOptions options, const trace::RunInfo &run, trace::EventsWriter events, JobsCsvWriter jobs)
       : options_(std::move(options)),
         run_(std::make_unique<trace::RunInfo>(run)),
         events_(std::move(events)),
@@ -69,10 +69,13 @@ class RunFiles {
   FilesOptions options_;
   std::unique_ptr<trace::RunInfo> run_;  // the picture refers to it
   trace::EventsWriter events_;
-  metrics::JobsCsvWriter jobs_;
-  std::optional<metrics::PerfettoWriter> picture_;
+  JobsCsvWriter jobs_;
+  std::optional<PerfettoWriter> picture_;
   std::uint64_t count_ = 0;
   bool lacks_picture_ = false;
 };
 
-}  // namespace redag::lab
+/// Writes all files of a run in memory, and returns their names. Error: everything that failed.
+[[nodiscard]] Result<std::string> write_run_files(const FilesOptions &options, const trace::Trace &trace);
+
+}  // namespace redag::metrics
