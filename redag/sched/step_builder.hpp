@@ -68,6 +68,17 @@ class StepBuilder {
                                    .level = level});
   }
 
+  /// Tells that a device begins to serve the job.
+  void tell_service(const Job &job, JobSlot slot) {
+    Dispatch &told = dispatches_.emplace_back();
+    told.job = slot;
+    told.task = job.task;
+    told.number = job.number;
+    told.release = job.release;
+    told.origin = job.origin;
+    told.kind = DispatchKind::Serve;
+  }
+
   /// Drops the changes of level that the step has for this job.
   void drop_level(JobSlot slot) {
     std::erase_if(dispatches_, [slot](const Dispatch &d) { return d.kind == DispatchKind::Level && d.job == slot; });
