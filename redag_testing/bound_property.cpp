@@ -145,8 +145,8 @@ void simulate_run(const BoundCase &bound_case, const analysis::TaskSet &task_set
   };
   options.wait = [&](const Task &task, TaskId id, std::uint32_t number, std::size_t wait) {
     Rng rng = Rng::stream(run.seed + 4 + wait, id.value, number);
-    const Duration longest = task.waits[wait].longest;
-    return rng.uniform01() < run.full_demand ? longest : rng.uniform(1, longest);
+    const Duration most = task.waits[wait].longest;
+    return rng.uniform01() < run.full_demand ? most : rng.uniform(1, most);
   };
   options.gap = [&](const Task &task, TaskId id, std::uint32_t number) -> Duration {
     if (id.value >= tasks) {

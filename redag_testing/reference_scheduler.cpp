@@ -295,6 +295,8 @@ void ReferenceScheduler::serve(Time now) {
                                      .number = jobs_[first].number,
                                      .release = jobs_[first].release,
                                      .origin = jobs_[first].origin,
+                                     .worker = WorkerId::none(),
+                                     .over = JobSlot::none(),
                                      .kind = sched::DispatchKind::Serve});
     }
   }
