@@ -50,7 +50,7 @@ Workload three(Device::Queue queue = Device::Queue::Priority) {
   Workload workload =
       testing::make_workload({testing::tick_dag("a", {{"hi", 100, 4}}), testing::tick_dag("b", {{"mid", 200, 10}}),
                               testing::tick_dag("c", {{"lo", 300, 6}}), testing::tick_dag("d", {{"least", 400, 6}})},
-                             1, PreemptionMode::Os);
+                             1, PreemptionMode::Auto);
   workload.platform.devices = {Device{"gpu", 1, queue}};
   const DeviceId gpu(std::size_t{0});
   workload.dags[0].tasks[0].waits = {Wait{1, 5, 0, gpu}, Wait{2, 3, 0, {}}};
