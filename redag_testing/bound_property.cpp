@@ -13,6 +13,7 @@
 
 #include <fmt/format.h>
 
+#include "redag/model/waits.hpp"
 #include "redag_analysis/analyze/executors.hpp"
 #include "redag_analysis/metrics/deadline_watch.hpp"
 #include "redag_analysis/sim/simulator.hpp"
@@ -140,7 +141,12 @@ void simulate_run(const BoundCase &bound_case, const analysis::TaskSet &task_set
   options.demand = [&](const Task &task, TaskId id, std::uint32_t number) {
     if (id.value >= tasks) return task.wcet - platform.release_overhead - platform.dispatch_overhead;
     Rng rng = Rng::stream(run.seed, id.value, number);
-    return rng.uniform01() < run.full_demand ? task.wcet : rng.uniform(1, task.wcet);
+    return rng.uniform01() < run.full_demand ? task.wcet : rng.uniform(shortest_demand(task), task.wcet);
+  };
+  options.wait = [&](const Task &task, TaskId id, std::uint32_t number, std::size_t wait) {
+    Rng rng = Rng::stream(run.seed + 4 + wait, id.value, number);
+    const Duration most = task.waits[wait].longest;
+    return rng.uniform01() < run.full_demand ? most : rng.uniform(1, most);
   };
   options.gap = [&](const Task &task, TaskId id, std::uint32_t number) -> Duration {
     if (id.value >= tasks) {
@@ -248,7 +254,7 @@ void check_one(const analysis::Method &method, const BoundGenerator &generator, 
   const executors::ExecutorKind &executor = *executors::find_executor(options.executor);
   const auto task_set = analysis::compile_for(executor, bound_case.workload, bound_case.platform);
   ASSERT_TRUE(task_set) << to_string(task_set.error()) << describe(bound_case);
-  if (!task_set->not_analysable.empty()) {
+  if (!task_set->not_analysable.empty() && !(task_set->has_waits && method.knows_waits)) {
     ++result.not_applicable;
     return;
   }
@@ -357,6 +363,9 @@ std::string describe(const BoundCase &bound_case) {
       "m={} preemption={} policy={} ties={} levels={} overheads={}/{}/{}\n", platform.workers,
       static_cast<int>(platform.preemption), to_string(bound_case.workload.policy), to_string(bound_case.workload.ties),
       platform.levels, platform.release_overhead, platform.dispatch_overhead, platform.preempt_overhead);
+  for (const Device &device : bound_case.workload.platform.devices) {
+    text += fmt::format("device {} slots={} queue={}\n", device.name, device.slots, to_string(device.queue));
+  }
   for (const Dag &dag : bound_case.workload.dags) {
     text += fmt::format("dag {} max_active={} deadline={}\n", dag.name, dag.max_active, dag.deadline);
     for (const Task &task : dag.tasks) {
@@ -365,6 +374,11 @@ std::string describe(const BoundCase &bound_case) {
                           task.deadline, task.jitter, task.offset, task.region,
                           task.overrun == Overrun::Queue ? task.queue_depth : 0, task.priority.value_or(0), task.group,
                           fmt::join(task.predecessors, ","));
+      for (const Wait &wait : task.waits) {
+        text +=
+            fmt::format("    waits after {} for {} at {}\n", wait.after, wait.longest,
+                        wait.device.valid() ? bound_case.workload.platform.devices[wait.device.value].name : "none");
+      }
     }
   }
   return text;

@@ -57,6 +57,7 @@ Case make_case(PolicyKind policy, Preemption preemption, std::uint64_t seed) {
   Case c;
   c.workload = random_workload(rng, limits);
   c.config = random_config(rng, policy, preemption, c.workload.task_count());
+  c.workload.platform.devices = random_devices(rng);
   c.script = random_script(seed, static_cast<std::size_t>(rng.uniform(10, 300)), rng.uniform01() < 0.4);
   return c;
 }
@@ -111,6 +112,8 @@ RC_GTEST_PROP(DifferentialProperty, AnySequenceOfEventsIsDecidedAlike, (std::uin
                                                     {2, Kind::PreemptionPoint},
                                                     {1, Kind::Miss},
                                                     {1, Kind::Exceed},
+                                                    {2, Kind::Wait},
+                                                    {2, Kind::Wake},
                                                     {1, Kind::DispatchSome},
                                                     {1, Kind::AddTask},
                                                     {1, Kind::RemoveTask},

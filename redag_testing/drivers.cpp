@@ -58,7 +58,11 @@ std::vector<Arrival> arrivals(const RunSpec &spec) {
 class RandomJobs {
  public:
   RandomJobs(const Workload &workload, sched::Scheduler &scheduler, sched::Preemption preemption, std::uint64_t seed)
-      : tasks_(flatten(workload)), scheduler_(scheduler), preemption_(preemption), rng_(seed) {}
+      : tasks_(flatten(workload)),
+        devices_(workload.platform.devices.size()),
+        scheduler_(scheduler),
+        preemption_(preemption),
+        rng_(seed) {}
 
   void carry_out(const sched::Step &step) {
     for (const sched::Dispatch &dispatch : step.dispatches) {
@@ -67,11 +71,13 @@ class RandomJobs {
       }
       if (dispatch.kind == sched::DispatchKind::Level) continue;
       if (dispatch.kind == sched::DispatchKind::Start) {
-        started_.push_back({dispatch.job, dispatch.task, true, false, false});
+        started_.push_back({dispatch.job, dispatch.task, true, false, false, {}});
         continue;
       }
       for (Started &job : started_) {
-        if (job.slot == dispatch.job) job.runs = true;
+        if (job.slot != dispatch.job) continue;
+        job.runs = dispatch.kind == sched::DispatchKind::Resume;
+        job.wait = job.runs ? Waiting::No : Waiting::Served;
       }
     }
   }
@@ -81,8 +87,10 @@ class RandomJobs {
     if (started_.empty()) return;
     const auto choice = static_cast<std::size_t>(rng_.uniform(0, static_cast<std::int64_t>(started_.size()) - 1));
     Started &job = started_[choice];
-    if (!job.runs && preemption_ != sched::Preemption::Full) return;
+    if (job.wait != Waiting::No && goes_on_waiting(job, now)) return;
+    if (job.wait == Waiting::No && !job.runs && preemption_ != sched::Preemption::Full) return;
     const double dice = rng_.uniform01();
+    if (job.runs && devices_ > 0 && rng_.uniform01() < 0.3) return begin_wait(job, now);
     if (dice < 0.2 && exceed(job, now)) return;
     if (job.runs && preemption_ == sched::Preemption::Cooperative && dice < 0.5) {
       scheduler_.preemption_point(job.slot, now);
@@ -99,13 +107,34 @@ class RandomJobs {
   Rng &rng() { return rng_; }
 
  private:
+  enum class Waiting : std::uint8_t { No, Asked, Served, Woken };
   struct Started {
     JobSlot slot;
     TaskId task;
     bool runs = true;
     bool used_budget = false;
     bool used_wcet_low = false;
+    Waiting wait = Waiting::No;
   };
+
+  // The job asks a device, or waits for something else.
+  void begin_wait(Started &job, Time now) {
+    const auto device = static_cast<std::size_t>(rng_.uniform(0, static_cast<std::int64_t>(devices_)));
+    const DeviceId asked = device < devices_ ? DeviceId(device) : DeviceId::none();
+    job.runs = false;
+    job.wait = asked.valid() ? Waiting::Asked : Waiting::Served;
+    scheduler_.wait(job.slot, asked, now);
+  }
+
+  // Returns false if the job is to end while it waits.
+  bool goes_on_waiting(Started &job, Time now) {
+    if (rng_.uniform01() < 0.05) return false;
+    if (job.wait == Waiting::Served) {
+      job.wait = Waiting::Woken;
+      scheduler_.wake(job.slot, now);
+    }
+    return true;
+  }
 
   // Makes the job use up one of its limits, if any is left.
   bool exceed(Started &job, Time now) {
@@ -122,6 +151,7 @@ class RandomJobs {
   }
 
   std::vector<TaskRef> tasks_;
+  std::size_t devices_;
   sched::Scheduler &scheduler_;
   sched::Preemption preemption_;
   Rng rng_;

@@ -176,6 +176,36 @@ Workload contended(Rng &rng, bool overload) {
   return workload;
 }
 
+std::vector<Device> random_devices(Rng &rng) {
+  std::vector<Device> devices(between(rng, 0, 2));
+  for (std::size_t d = 0; d < devices.size(); ++d) {
+    devices[d].name = fmt::format("device{}", d);
+    devices[d].slots = between(rng, 1, 2);
+    devices[d].queue = chance(rng, 0.7) ? Device::Queue::Priority : Device::Queue::Fifo;
+  }
+  return devices;
+}
+
+void add_waits(Rng &rng, Workload &workload) {
+  workload.platform.devices = random_devices(rng);
+  const auto devices = static_cast<std::uint32_t>(workload.platform.devices.size());
+  for (Dag &dag : workload.dags) {
+    for (Task &task : dag.tasks) {
+      if (task.wcet < 2 || chance(rng, 0.5)) continue;
+      const std::uint32_t count = between(rng, 1, static_cast<std::uint32_t>(std::min<Duration>(3, task.wcet - 1)));
+      for (std::uint32_t w = 0; w < count; ++w) {
+        Wait wait;
+        wait.after = (w + 1) * task.wcet / (count + 1);
+        wait.longest = std::max<Duration>(1, task.wcet / 2 * rng.uniform(1, 4));
+        if (chance(rng, 0.5)) wait.shortest = rng.uniform(1, wait.longest);
+        const std::uint32_t device = between(rng, 0, devices);
+        if (device < devices) wait.device = DeviceId(std::size_t{device});
+        task.waits.push_back(wait);
+      }
+    }
+  }
+}
+
 void divide(Rng &rng, Workload &workload) {
   std::vector<Cluster> &clusters = workload.platform.clusters;
   clusters.resize(between(rng, 1, 3));
@@ -210,6 +240,9 @@ std::string describe(const Workload &workload, const sched::Config &config) {
   std::string text = fmt::format("{} workers, preemption {}, {}, ties {}, {} levels, {} started at most\n",
                                  config.workers, static_cast<int>(config.preemption), to_string(config.policy),
                                  to_string(config.ties), config.levels, config.max_started);
+  for (const Device &device : workload.platform.devices) {
+    text += fmt::format("device {}: {} slots, {}\n", device.name, device.slots, to_string(device.queue));
+  }
   std::size_t id = 0;
   for (const Dag &dag : workload.dags) {
     text += fmt::format("dag {}: max_active {}, max_pending {}, criticality {}, degrade {} {} {}\n", dag.name,

@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include <rapidcheck.h>
 
@@ -40,6 +41,12 @@ struct RandomWorkloadLimits {
 /// workers to above them. Adds what generate() does not draw: max_pending, budgets, regions, concurrency, priorities;
 /// with `overload` also wcet_low, degradation, and budgets that do not abort.
 [[nodiscard]] Workload contended(Rng &rng, bool overload = true);
+
+/// No, one or two devices of one or two slots.
+[[nodiscard]] std::vector<Device> random_devices(Rng &rng);
+
+/// Adds devices, and waits to about half of the tasks.
+void add_waits(Rng &rng, Workload &workload);
 
 /// Divides the platform into one to three clusters of one to three workers, and the DAGs among them. A group becomes
 /// one of its cluster.

@@ -20,7 +20,7 @@ using sched::Preemption;
 using sched::Step;
 
 ReferenceScheduler::ReferenceScheduler(const Workload &workload, const sched::Config &config)
-    : config_(config), workers_(config.workers) {
+    : config_(config), devices_(workload.platform.devices), workers_(config.workers) {
   for (const Dag &dag : workload.dags) add_tasks(dag);
   rank_tasks();
 }
@@ -233,9 +233,9 @@ void ReferenceScheduler::skip(std::size_t job, Time now, Reason reason) {
 void ReferenceScheduler::complete(JobSlot slot, Time now, Outcome outcome) {
   const std::size_t job = slot.value;
   Job &j = jobs_[job];
-  const bool suspended_by_force = j.state == State::Suspended && config_.preemption == Preemption::Full;
-  REDAG_CHECK(j.state == State::Running || suspended_by_force, "only a job that runs can end");
-  if (j.state == State::Running) workers_[j.worker].pop_back();
+  const bool waits = j.state == State::AtDevice || j.state == State::Away;
+  REDAG_CHECK(j.state == State::Running || waits_for_worker(j) || waits, "only a job that runs or waits can end");
+  leave_worker(j);
   j.state = State::Done;
   if (outcome == Outcome::Finished) {
     ++tasks_[j.task].count.finished;
@@ -249,6 +249,66 @@ void ReferenceScheduler::complete(JobSlot slot, Time now, Outcome outcome) {
                                                                : Reason::NoData;
     emit(JobEventKind::Aborted, job, now, now, j.worker, reason);
   }
+}
+
+// ---- "Waits" --------------------------------------------------------------------------------------------------------
+
+void ReferenceScheduler::wait(JobSlot slot, DeviceId device, Time now) {
+  Job &j = jobs_[slot.value];
+  const bool ran_unseen = config_.preemption == Preemption::Full && waits_for_worker(j);
+  REDAG_CHECK(j.state == State::Running || ran_unseen, "only a job that runs can wait");
+  leave_worker(j);
+  j.device = device.valid() ? device.value : kNone;
+  j.asked = requests_++;
+  j.state = device.valid() ? State::AtDevice : State::Away;
+  emit(JobEventKind::Waits, slot.value, now, device.valid() ? std::int64_t{device.value} : -1, j.worker);
+}
+
+void ReferenceScheduler::wake(JobSlot slot, Time now) {
+  Job &j = jobs_[slot.value];
+  REDAG_CHECK(j.state == State::Away, "only a job that waits can be woken");
+  j.state = State::Woken;
+  emit(JobEventKind::Woken, slot.value, now, j.device == kNone ? -1 : static_cast<std::int64_t>(j.device),
+       WorkerId::kNoneValue);
+}
+
+// Every free slot of a device goes to the first job that waits for it.
+void ReferenceScheduler::serve(Time now) {
+  for (std::size_t device = 0; device < devices_.size(); ++device) {
+    for (;;) {
+      std::size_t used = 0;
+      std::size_t first = kNone;
+      for (std::size_t i = 0; i < jobs_.size(); ++i) {
+        if (jobs_[i].device != device) continue;
+        if (jobs_[i].state == State::Away) ++used;
+        if (jobs_[i].state != State::AtDevice) continue;
+        const bool is_fifo = devices_[device].queue == Device::Queue::Fifo;
+        const bool is_first =
+            first == kNone || (is_fifo ? jobs_[i].asked < jobs_[first].asked : is_before(standing(i), standing(first)));
+        if (is_first) first = i;
+      }
+      if (first == kNone || used >= devices_[device].slots) break;
+      jobs_[first].state = State::Away;
+      emit(JobEventKind::Served, first, now, static_cast<std::int64_t>(device), WorkerId::kNoneValue);
+      dispatches_.push_back(Dispatch{.job = JobSlot(first),
+                                     .task = TaskId(jobs_[first].task),
+                                     .number = jobs_[first].number,
+                                     .release = jobs_[first].release,
+                                     .origin = jobs_[first].origin,
+                                     .worker = WorkerId::none(),
+                                     .over = JobSlot::none(),
+                                     .kind = sched::DispatchKind::Serve});
+    }
+  }
+}
+
+// True for a started job that any worker could continue.
+bool ReferenceScheduler::waits_for_worker(const Job &job) const {
+  return job.state == State::Woken || (job.state == State::Suspended && config_.preemption == Preemption::Full);
+}
+
+void ReferenceScheduler::leave_worker(const Job &job) {
+  if (job.state == State::Running) workers_[job.worker].pop_back();
 }
 
 void ReferenceScheduler::deliver(std::size_t job, Time now) {
@@ -377,7 +437,7 @@ void ReferenceScheduler::preemption_point(JobSlot job, Time /*now*/) {
 // ---- who may run ----------------------------------------------------------------------------------------------------
 
 bool ReferenceScheduler::started(const Job &job) const {
-  return job.state == State::Running || job.state == State::Suspended;
+  return job.state != State::Waiting && job.state != State::Ready && job.state != State::Done;
 }
 
 std::vector<std::size_t> ReferenceScheduler::jobs_of(std::size_t task, State state) const {
@@ -476,7 +536,9 @@ bool ReferenceScheduler::outranks(std::size_t a, std::size_t b) const {
   const Standing of = standing(b);
   if (by.demoted && of.demoted) return false;  // all on one level
   if (has_levels()) return level_of(a) < level_of(b);
-  return config_.ties == Ties::Share ? is_of_higher_priority(by, of) : is_before(by, of);
+  // Under a static policy a level is at least a task: jobs of one task do not interrupt each other.
+  const bool by_levels = config_.ties == Ties::Share || is_static(config_.policy);
+  return by_levels ? is_of_higher_priority(by, of) : is_before(by, of);
 }
 
 /// True if `a` is considered first. Within a level, as in the operating system, a started job is.
@@ -509,6 +571,7 @@ Step ReferenceScheduler::dispatch(Time now, std::uint32_t most) {
     }
   }
   if (config_.preemption == Preemption::Cooperative) resume_uncovered(now);
+  serve(now);
   for (Job &job : jobs_) job.at_point = false;
   if (high_mode_) end_high_mode(now);
   tell_levels();
@@ -520,7 +583,7 @@ Step ReferenceScheduler::dispatch(Time now, std::uint32_t most) {
 std::size_t ReferenceScheduler::first_candidate(const std::vector<std::size_t> &passed_over, bool may_start) const {
   std::size_t first = kNone;
   for (std::size_t i = 0; i < jobs_.size(); ++i) {
-    const bool resumable = jobs_[i].state == State::Suspended && config_.preemption == Preemption::Full;
+    const bool resumable = waits_for_worker(jobs_[i]);
     if (!(jobs_[i].state == State::Ready && may_start) && !resumable) continue;
     if (std::find(passed_over.begin(), passed_over.end(), i) != passed_over.end()) continue;
     if (first == kNone || considered_before(i, first)) first = i;
@@ -579,7 +642,7 @@ void ReferenceScheduler::place(std::size_t job, std::uint32_t worker, Time now) 
     under.state = State::Suspended;
     if (config_.preemption == Preemption::Full) stack.pop_back();
   }
-  const bool resumes = j.state == State::Suspended;
+  const bool resumes = j.state == State::Suspended || j.state == State::Woken;
   if (resumes) decision.kind = sched::DispatchKind::Resume;
   j.state = State::Running;
   j.told_level = decision.level;
@@ -618,8 +681,7 @@ Dispatch ReferenceScheduler::decision_of(std::size_t job) const {
 void ReferenceScheduler::tell_levels() {
   for (std::size_t i = 0; i < jobs_.size(); ++i) {
     Job &j = jobs_[i];
-    const bool is_scheduled =
-        j.state == State::Running || (j.state == State::Suspended && config_.preemption == Preemption::Full);
+    const bool is_scheduled = j.state == State::Running || (started(j) && config_.preemption == Preemption::Full);
     if (!is_scheduled || j.told_level == level_of(i)) continue;
     j.told_level = level_of(i);
     dispatches_.push_back(decision_of(i));

@@ -25,6 +25,8 @@ class ReferenceScheduler final : public sched::Scheduler {
   void miss(TaskId task, Time nominal, Time now, Reason reason) override;
   void complete(JobSlot job, Time now, sched::Outcome outcome) override;
   void exceed(JobSlot job, sched::Limit limit, Time now) override;
+  void wait(JobSlot job, DeviceId device, Time now) override;
+  void wake(JobSlot job, Time now) override;
   /// Does nothing: the reference always reports all events, for comparison.
   void record_only(sched::EventKinds /*kinds*/) override {}
   [[nodiscard]] bool high_mode() const override { return high_mode_; }
@@ -78,8 +80,9 @@ class ReferenceScheduler final : public sched::Scheduler {
     bool removed = false;
   };
 
-  /// Waiting -> Ready -> Running -> Done; Running <-> Suspended; Waiting, Ready -> Done (skipped).
-  enum class State : std::uint8_t { Waiting, Ready, Running, Suspended, Done };
+  /// Waiting -> Ready -> Running -> Done; Running <-> Suspended; Waiting, Ready -> Done (skipped). A job that waits
+  /// without a worker: Running -> (AtDevice ->) Away -> Woken -> Running; AtDevice: in the device's queue.
+  enum class State : std::uint8_t { Waiting, Ready, Running, Suspended, AtDevice, Away, Woken, Done };
 
   /// Jobs stay in `jobs_` forever; a slot is a position in it.
   struct Job {
@@ -97,6 +100,8 @@ class ReferenceScheduler final : public sched::Scheduler {
     bool at_point = false;                  // until the next dispatch
     std::size_t heir_of = kNone;            // the job whose priority this one has inherited
     bool demoted = false;
+    std::size_t device = kNone;  // of its wait
+    std::uint64_t asked = 0;     // order of the requests for devices
     std::vector<Data> consumed;  // parallel to the task's predecessors
   };
 
@@ -156,6 +161,9 @@ class ReferenceScheduler final : public sched::Scheduler {
   [[nodiscard]] bool can_start(std::size_t job, Time now);
   void place(std::size_t job, std::uint32_t worker, Time now);
   void resume_uncovered(Time now);
+  void serve(Time now);
+  [[nodiscard]] bool waits_for_worker(const Job &job) const;
+  void leave_worker(const Job &job);
   [[nodiscard]] sched::Dispatch decision_of(std::size_t job) const;
   void tell_levels();
   void emit(JobEventKind kind, std::size_t job, Time now, std::int64_t value, std::uint32_t worker,
@@ -164,6 +172,8 @@ class ReferenceScheduler final : public sched::Scheduler {
   sched::Config config_;
   std::vector<DagState> dags_;
   std::vector<TaskState> tasks_;
+  std::vector<Device> devices_;
+  std::uint64_t requests_ = 0;
   std::vector<Job> jobs_;
   std::vector<Stack> workers_;
   std::uint64_t ready_count_ = 0;

@@ -73,7 +73,7 @@ class Side {
     for (const Dispatch &d : step.dispatches) {
       const JobKey key{d.task.value, d.number};
       slots_[key] = d.job;
-      levels_[key] = d.level;
+      if (d.kind != sched::DispatchKind::Serve) levels_[key] = d.level;
     }
     return normalised(step, uncounted);
   }
@@ -89,7 +89,7 @@ class Side {
 class Run {
  public:
   Run(sched::Scheduler &tested, sched::Scheduler &expected, const Workload &workload, const sched::Config &config)
-      : tested_(tested), expected_(expected), config_(config) {
+      : tested_(tested), expected_(expected), config_(config), devices_(workload.platform.devices.size()) {
     for (const Dag &dag : workload.dags) know(dag);
   }
 
@@ -102,6 +102,8 @@ class Run {
       case Kind::Finish: return finish(step.choice);
       case Kind::PreemptionPoint: preemption_point(step.choice); break;
       case Kind::Exceed: exceed(step.choice); break;
+      case Kind::Wait: wait(step.choice); break;
+      case Kind::Wake: wake(step.choice); break;
       case Kind::Dispatch: return dispatch();
       case Kind::DispatchSome: return dispatch_some(step.choice);
       case Kind::AddDag: add_dag(step.choice); break;
@@ -130,7 +132,7 @@ class Run {
   }
 
  private:
-  enum class State : std::uint8_t { Running, Suspended };
+  enum class State : std::uint8_t { Running, Suspended, Queued, Away, Woken };
   struct KnownDag {
     bool bounded = false;  // has a max_active
     bool removed = false;
@@ -171,15 +173,44 @@ class Run {
   }
 
   // Returns a running job, which ends; with full preemption sometimes one that counts as preempted, because the
-  // operating system ran it.
+  // operating system ran it. Sometimes a job ends while it waits.
   [[nodiscard]] std::optional<JobKey> job_that_ends(std::uint8_t choice) const {
-    const bool any = config_.preemption == Preemption::Full && choice >= 240;
     std::vector<JobKey> jobs;
     for (const auto &[key, state] : jobs_) {
-      if (any || state == State::Running) jobs.push_back(key);
+      const bool can_end = state != State::Suspended || config_.preemption == Preemption::Full;
+      if (state == State::Running || (choice >= 240 && can_end)) jobs.push_back(key);
     }
     if (jobs.empty()) return std::nullopt;
     return jobs[choice / 8U % jobs.size()];
+  }
+
+  // A running job waits; with full preemption sometimes one that the scheduler has not resumed.
+  void wait(std::uint8_t choice) {
+    std::vector<JobKey> jobs;
+    for (const auto &[key, state] : jobs_) {
+      const bool runs_unseen = config_.preemption == Preemption::Full && choice >= 240 &&
+                               (state == State::Suspended || state == State::Woken);
+      if (state == State::Running || runs_unseen) jobs.push_back(key);
+    }
+    if (jobs.empty()) return;
+    const JobKey key = jobs[choice / 4U % jobs.size()];
+    const std::size_t device = choice % 4U;
+    const DeviceId asked = device < devices_ ? DeviceId(device) : DeviceId::none();
+    tested_->wait(tested_.slot(key), asked, now_);
+    expected_->wait(expected_.slot(key), asked, now_);
+    jobs_[key] = asked.valid() ? State::Queued : State::Away;
+  }
+
+  void wake(std::uint8_t choice) {
+    std::vector<JobKey> jobs;
+    for (const auto &[key, state] : jobs_) {
+      if (state == State::Away) jobs.push_back(key);
+    }
+    if (jobs.empty()) return;
+    const JobKey key = jobs[choice % jobs.size()];
+    tested_->wake(tested_.slot(key), now_);
+    expected_->wake(expected_.slot(key), now_);
+    jobs_[key] = State::Woken;
   }
   [[nodiscard]] static Outcome outcome_of(std::uint8_t choice) {
     return choice % 8 == 0   ? Outcome::Threw
@@ -330,11 +361,13 @@ class Run {
     const JobKey key{event.task.value, event.job};
     if (event.kind == JobEventKind::Dispatched || event.kind == JobEventKind::Resumed) jobs_[key] = State::Running;
     if (event.kind == JobEventKind::Preempted) jobs_[key] = State::Suspended;
+    if (event.kind == JobEventKind::Served) jobs_[key] = State::Away;
   }
 
   Side tested_;
   Side expected_;
   sched::Config config_;
+  std::size_t devices_;
   Time now_ = 0;
   std::vector<KnownDag> dags_;
   std::size_t task_count_ = 0;
@@ -356,6 +389,8 @@ const char *name_of(Kind kind) {
     case Kind::Finish: return "finish";
     case Kind::PreemptionPoint: return "point";
     case Kind::Exceed: return "exceed";
+    case Kind::Wait: return "wait";
+    case Kind::Wake: return "wake";
     case Kind::Dispatch: return "dispatch";
     case Kind::DispatchSome: return "dispatch_some";
     case Kind::AddDag: return "add";
@@ -378,6 +413,7 @@ Script random_script(std::uint64_t seed, std::size_t length, bool reconfigure) {
   const double point = 0.2 * rng.uniform01();
   const double advance = 0.1 + 0.5 * rng.uniform01();
   const double exceed = rng.uniform01() < 0.5 ? 0 : 0.15 * rng.uniform01();
+  const double waits = rng.uniform01() < 0.5 ? 0 : 0.4 * rng.uniform01();
   const double limited = rng.uniform01() < 0.5 ? 0 : 0.5 * rng.uniform01();
   constexpr std::array<Kind, 6> kReconfigurations{Kind::AddDag,     Kind::RemoveDag, Kind::AddTask,
                                                   Kind::RemoveTask, Kind::SetTiming, Kind::SetTiming};
@@ -389,6 +425,8 @@ Script random_script(std::uint64_t seed, std::size_t length, bool reconfigure) {
       step.kind = rng.uniform01() < limited ? Kind::DispatchSome : Kind::Dispatch;
     } else if (reconfigure && rng.uniform01() < 0.06) {
       step.kind = kReconfigurations.at(static_cast<std::size_t>(rng.uniform(0, kReconfigurations.size() - 1)));
+    } else if (waits > 0 && rng.uniform01() < waits) {
+      step.kind = rng.uniform01() < 0.5 ? Kind::Wait : Kind::Wake;
     } else if (rng.uniform01() < exceed) {
       step.kind = Kind::Exceed;
     } else if (kind < release) {

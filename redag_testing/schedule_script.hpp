@@ -26,6 +26,8 @@ struct ScriptStep {
     Finish,  // completes a job and dispatches: the tested scheduler in one call, the expected one in two
     PreemptionPoint,
     Exceed,  // of a budget, or of a wcet_low
+    Wait,    // for a device or for something else
+    Wake,
     Dispatch,
     DispatchSome,  // with a limit
     AddDag,

@@ -60,6 +60,7 @@ std::string timeline(const Workload &workload, std::span<const JobEvent> events)
       case JobEventKind::Resumed:
         lines[line_of[job]] += fmt::format(" w{} {}-", event.worker, in_ms(event.time));
         break;
+      case JobEventKind::Waits: lines[line_of[job]] += in_ms(event.time) + " ~"; break;
       case JobEventKind::Preempted:
       case JobEventKind::Finished: lines[line_of[job]] += in_ms(event.time); break;
       case JobEventKind::Aborted:

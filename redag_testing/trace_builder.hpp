@@ -55,6 +55,16 @@ class TraceBuilder {
   TraceBuilder &resumed(const char *task, std::uint32_t job, std::uint32_t worker) {
     return add(JobEventKind::Resumed, task, job, 0, worker);
   }
+  /// Leaves `worker` to wait for a device, or for something else (-1).
+  TraceBuilder &waits(const char *task, std::uint32_t job, std::uint32_t worker, std::int64_t device) {
+    return add(JobEventKind::Waits, task, job, device, worker);
+  }
+  TraceBuilder &served(const char *task, std::uint32_t job, std::int64_t device) {
+    return add(JobEventKind::Served, task, job, device);
+  }
+  TraceBuilder &woken(const char *task, std::uint32_t job, std::int64_t device) {
+    return add(JobEventKind::Woken, task, job, device);
+  }
   TraceBuilder &finished(const char *task, std::uint32_t job, std::uint32_t worker) {
     return add(JobEventKind::Finished, task, job, now_, worker);
   }

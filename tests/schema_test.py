@@ -160,6 +160,35 @@ class SchemaTest(unittest.TestCase):
                 document["dags"][0]["cluster"] = "left"
                 self.assertEqual(errors(document) == [], is_valid)
 
+    def test_devices(self):
+        for devices, is_valid in (
+            ({"gpu": {"slots": 2, "queue": "fifo"}, "dla": None}, True),
+            ({"gpu": {"slots": 0}}, False),
+            ({"gpu": {"queue": "lifo"}}, False),
+            (["gpu"], False),
+        ):
+            with self.subTest(devices=devices):
+                self.assertEqual(errors({**with_task(), "platform": {"devices": devices}}) == [], is_valid)
+        both = {"devices": {"gpu": {}}, "clusters": [{"name": "left"}]}
+        self.assertNotEqual(errors({**with_task(), "platform": both}), [])
+
+    def test_segments(self):
+        cpu = {"cpu": "1ms"}
+        for segments, is_valid in (
+            ([cpu, {"device": "gpu", "for": "2ms", "at_least": "1ms"}, cpu], True),
+            ([cpu, {"wait": "2ms"}, cpu, {"wait": "2ms", "at_least": "1ms"}, cpu], True),
+            ([cpu, {"device": "gpu"}, cpu], False),
+            ([cpu, {"wait": "2ms", "for": "1ms"}, cpu], False),
+            ([cpu, {"wait": 0}, cpu], False),
+            ([cpu], False),
+            ("5ms", False),
+        ):
+            with self.subTest(segments=segments):
+                document = with_task(segments=segments)
+                del document["dags"][0]["tasks"][0]["wcet"]
+                self.assertEqual(errors(document) == [], is_valid)
+        self.assertNotEqual(errors(with_task(segments=[cpu, {"wait": "2ms"}, cpu])), [])
+
     def test_only_a_callback_may_be_without_wcet(self):
         document = with_task(callback={"node": "/n", "timer": "any"})
         del document["dags"][0]["tasks"][0]["wcet"]

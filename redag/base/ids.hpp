@@ -29,6 +29,7 @@ struct Id {
 using TaskId = Id<struct TaskTag>;      // index of a task in its workload: DAG by DAG, task by task
 using DagId = Id<struct DagTag>;        // index of a DAG in its workload
 using WorkerId = Id<struct WorkerTag>;  // one of the platform's m processors
+using DeviceId = Id<struct DeviceTag>;  // index of a device in its platform
 using JobSlot = Id<struct JobTag>;      // storage of a live job; reused once the job has ended
 
 }  // namespace redag

@@ -35,7 +35,8 @@ void on_task(const void *executor, TaskId id, DagId dag, const Task &task) noexc
   case_of(Released, released) case_of(Ready, ready) case_of(Deferred, deferred) case_of(Dispatched, dispatched)        \
       case_of(Started, started) case_of(Preempted, preempted) case_of(Resumed, resumed) case_of(Finished, finished)    \
           case_of(Skipped, skipped) case_of(Aborted, aborted) case_of(Exceeded, exceeded) case_of(HighMode, high_mode) \
-              case_of(LowMode, low_mode) case_of(Executed, executed)
+              case_of(LowMode, low_mode) case_of(Executed, executed) case_of(Waits, waits) case_of(Served, served)     \
+                  case_of(Woken, woken)
 
 #define REDAG_RECORD(kind, name)                                                                                 \
   case JobEventKind::kind:                                                                                       \

@@ -45,6 +45,9 @@ REDAG_JOB_EVENT(exceeded)
 REDAG_JOB_EVENT(high_mode)
 REDAG_JOB_EVENT(low_mode)
 REDAG_JOB_EVENT(executed)
+REDAG_JOB_EVENT(waits)
+REDAG_JOB_EVENT(served)
+REDAG_JOB_EVENT(woken)
 
 LTTNG_UST_TRACEPOINT_EVENT(redag, deadline_missed,
   LTTNG_UST_TP_ARGS(const void *, executor, uint32_t, task, uint32_t, job, int64_t, time_ns, int64_t, lateness_ns),

@@ -21,6 +21,9 @@ const char *to_string(JobEventKind kind) {
     case JobEventKind::HighMode: return "high_mode";
     case JobEventKind::LowMode: return "low_mode";
     case JobEventKind::Executed: return "executed";
+    case JobEventKind::Waits: return "waits";
+    case JobEventKind::Served: return "served";
+    case JobEventKind::Woken: return "woken";
   }
   return "?";
 }

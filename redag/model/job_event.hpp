@@ -15,6 +15,7 @@ namespace redag {
 // Life of a job:
 //   Released -> Ready -> Dispatched -> Finished | Aborted
 //   Dispatched -> Preempted -> Resumed -> ... -> Finished | Aborted
+//   Dispatched -> Waits -> [Served ->] Woken -> Resumed -> ... -> Finished | Aborted
 //   Released -> Skipped, Released -> Ready -> Skipped
 // Exceeded can happen to a job that has started. HighMode and LowMode happen to the run, and name the job that caused
 // them.
@@ -34,6 +35,9 @@ enum class JobEventKind : std::uint8_t {
   HighMode,    // HI mode begins: this job of a high-criticality DAG used its `wcet_low`
   LowMode,     // HI mode ends: nothing is ready or started; the job is that of HighMode, value: when HI mode began
   Executed,    // the body ended (reported by the driver, before the job's end); value: processor time that it used
+  Waits,       // left `worker` to wait; value: the device that it asked, or -1 for none
+  Served,      // the device began to serve it; value: the device
+  Woken,       // its wait is over, and it needs a worker; value: the device, or -1
 };
 
 enum class Reason : std::uint8_t {
@@ -49,7 +53,7 @@ enum class Reason : std::uint8_t {
   Degraded,    // Skipped: in HI mode its DAG is degraded
 };
 
-inline constexpr auto kLastJobEventKind = JobEventKind::Executed;
+inline constexpr auto kLastJobEventKind = JobEventKind::Woken;
 inline constexpr auto kLastReason = Reason::Degraded;
 
 /// True for events that the job's thread reports and stamps. They are no decisions, and not in their order.
@@ -60,6 +64,11 @@ inline constexpr auto kLastReason = Reason::Degraded;
 /// True for events of the whole run. The job that they name may have ended.
 [[nodiscard]] constexpr bool is_mode_change(JobEventKind kind) {
   return kind == JobEventKind::HighMode || kind == JobEventKind::LowMode;
+}
+
+/// True for events of a job that waits without a worker.
+[[nodiscard]] constexpr bool is_of_wait(JobEventKind kind) {
+  return kind == JobEventKind::Waits || kind == JobEventKind::Served || kind == JobEventKind::Woken;
 }
 
 /// An event as the rings hold it: 32 bytes, trivially copyable.

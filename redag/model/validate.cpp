@@ -16,16 +16,17 @@
 #include "redag/model/callback_match.hpp"
 #include "redag/model/clusters.hpp"
 #include "redag/model/validate_edges.hpp"
+#include "redag/model/validate_waits.hpp"
 
 namespace redag {
 namespace {
 
 constexpr std::array<const char *, kFieldCount> kFieldNames = {
-    "name",      "platform",   "workers",     "preemption",  "policy",      "ties",   "dags",
-    "tasks",     "max_active", "max_pending", "criticality", "degrade",     "wcet",   "wcet_low",
-    "bcet",      "period",     "deadline",    "offset",      "jitter",      "region", "budget",
-    "on_budget", "activation", "overrun",     "priority",    "concurrency", "group",  "after",
-    "execution", "callback",   "clusters",    "cluster",     "cpus"};
+    "name",      "platform",   "workers",     "preemption",  "policy",      "ties",     "dags",
+    "tasks",     "max_active", "max_pending", "criticality", "degrade",     "wcet",     "wcet_low",
+    "bcet",      "period",     "deadline",    "offset",      "jitter",      "region",   "budget",
+    "on_budget", "activation", "overrun",     "priority",    "concurrency", "group",    "after",
+    "execution", "callback",   "clusters",    "cluster",     "cpus",        "segments", "devices"};
 
 struct DurationRule {
   Field field;
@@ -50,6 +51,7 @@ class Checker {
     if (!workload_.name.empty()) check_name(workload_.name, "workload");
     check_platform();
     check_clusters();
+    check_devices(workload_, findings_);
     if (workload_.dags.empty()) {
       findings_.error(Field::Dags, Field::Dags, "the workload has no DAGs", "add one under 'dags:'");
     }
@@ -255,6 +257,7 @@ class Checker {
       check_options(task);
       check_group_in_cluster(id, task);
       check_callback(task);
+      check_waits(workload_, task, options_.waits, findings_);
       sound_edges = check_edges(dag, i, findings_) && sound_edges;
     }
     check_graph(dag, id, sound_edges, findings_);

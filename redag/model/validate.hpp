@@ -23,6 +23,9 @@ inline constexpr std::uint32_t kMaxDegrade = 1'000'000;  // releases skipped, or
 inline constexpr std::uint32_t kMaxBound = 1'000'000;    // max_active, max_pending
 inline constexpr std::size_t kMaxNameBytes = 1000;
 inline constexpr std::size_t kMaxClusters = 64;
+inline constexpr std::size_t kMaxDevices = 64;
+inline constexpr std::uint32_t kMaxSlots = 4096;
+inline constexpr std::size_t kMaxWaits = 64;  // of one task
 
 /// Says why `name` cannot stand in one-line messages and tables: "is empty", "contains U+001B, ...". Empty if it can.
 [[nodiscard]] std::string name_mistake(std::string_view name);
@@ -62,9 +65,11 @@ enum class Field : std::uint8_t {
   Clusters,
   Cluster,
   Cpus,
+  Segments,
+  Devices,
 };
 
-inline constexpr std::size_t kFieldCount = 33;
+inline constexpr std::size_t kFieldCount = 35;
 
 [[nodiscard]] const char *to_string(Field field);
 
@@ -99,8 +104,9 @@ struct Finding {
   DagId dag;                   // invalid: about the workload
   std::uint32_t task = kNone;  // index in the DAG; kNone: about the DAG
   Field field = Field::Name;   // the field to point at
-  std::uint32_t item = kNone;  // index in `predecessors`, `samples` or `clusters`, or part of the callback
-  FieldSet involves;           // all fields that the rule examined
+  // Index in `predecessors`, `samples`, `clusters`, `devices` or `waits`, or part of the callback.
+  std::uint32_t item = kNone;
+  FieldSet involves;  // all fields that the rule examined
   std::string message;
   std::string hint;
 };
@@ -110,6 +116,8 @@ struct ValidateOptions {
   bool wcet_optional = false;
   /// Allows a DAG to name none of several clusters, because its cluster is yet to be found.
   bool cluster_optional = false;
+  /// Allows tasks to wait without a worker. What does not know waits must not get such a workload.
+  bool waits = false;
 };
 
 /// Returns every broken rule, in the order of the workload. Linear in its size. Accepts any workload without a crash.

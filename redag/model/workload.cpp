@@ -146,4 +146,6 @@ const char *to_string(PreemptionMode value) {
   return "?";
 }
 
+const char *to_string(Device::Queue value) { return value == Device::Queue::Priority ? "priority" : "fifo"; }
+
 }  // namespace redag

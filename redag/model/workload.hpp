@@ -67,6 +67,16 @@ struct Callback {
   friend bool operator==(const Callback &, const Callback &) = default;
 };
 
+/// A stretch of a job in which it holds no worker: a device serves it, or it waits for something else.
+struct Wait {
+  Duration after = 0;     // processor time of the job before it, of a job that executes for its wcet; in (0, wcet)
+  Duration longest = 0;   // > 0; at a device without the time in its queue
+  Duration shortest = 0;  // <= longest; 0: always `longest`
+  DeviceId device;        // in Platform::devices; none: it waits for no device (a service, a file, a sleep)
+
+  friend bool operator==(const Wait &, const Wait &) = default;
+};
+
 /// tau_i = (C_i, T_i, D_i, chi_i) of the paper (eq. task_tuple), and what a real callback needs besides.
 struct Task {
   std::string name;
@@ -90,6 +100,7 @@ struct Task {
   std::vector<std::uint32_t> predecessors;  // indices in the same DAG
   ExecutionTime execution;
   std::optional<Callback> callback;  // runs its jobs under ROS 2; its wcet may then be unknown (0)
+  std::vector<Wait> waits = {};      // ascending by `after`; empty: its jobs keep their worker until they end
 
   friend bool operator==(const Task &, const Task &) = default;
 };
@@ -150,10 +161,25 @@ struct Cluster {
   friend bool operator==(const Cluster &, const Cluster &) = default;
 };
 
+/// An accelerator or another resource that serves jobs while they hold no worker. Its service is never preempted.
+struct Device {
+  /// Which of the jobs that wait for a slot comes next.
+  enum class Queue : std::uint8_t {
+    Priority,  // the first in the order of jobs
+    Fifo,      // the one that asked first, as in most drivers
+  };
+  std::string name;
+  std::uint32_t slots = 1;  // jobs that it serves at the same time
+  Queue queue = Queue::Priority;
+
+  friend bool operator==(const Device &, const Device &) = default;
+};
+
 struct Platform {
   std::uint32_t workers = 1;  // m: jobs that execute at the same time; with clusters, the sum of theirs
   PreemptionMode preemption = PreemptionMode::Auto;
   std::vector<Cluster> clusters = {};  // empty: all workers serve all DAGs
+  std::vector<Device> devices = {};
 
   friend bool operator==(const Platform &, const Platform &) = default;
 };
@@ -198,5 +224,6 @@ void inherit_periods(Dag &dag);
 [[nodiscard]] const char *to_string(PolicyKind value);
 [[nodiscard]] const char *to_string(Ties value);
 [[nodiscard]] const char *to_string(PreemptionMode value);
+[[nodiscard]] const char *to_string(Device::Queue value);
 
 }  // namespace redag

@@ -27,16 +27,16 @@ namespace {
 using yaml::Node;
 
 constexpr std::array kTopFields = {Field::Name, Field::Platform, Field::Policy, Field::Ties, Field::Dags};
-constexpr std::array kPlatformFields = {Field::Workers, Field::Preemption, Field::Clusters};
+constexpr std::array kPlatformFields = {Field::Workers, Field::Preemption, Field::Clusters, Field::Devices};
 constexpr std::array kClusterFields = {Field::Name, Field::Workers, Field::Cpus};
 constexpr std::array kDagFields = {Field::Name,        Field::Cluster,   Field::Period,
                                    Field::Deadline,    Field::MaxActive, Field::MaxPending,
                                    Field::Criticality, Field::Degrade,   Field::Tasks};
-constexpr std::array kTaskFields = {Field::Name,       Field::Wcet,        Field::Bcet,     Field::Period,
-                                    Field::Deadline,   Field::Offset,      Field::Jitter,   Field::Region,
-                                    Field::Budget,     Field::Concurrency, Field::Group,    Field::Criticality,
-                                    Field::Activation, Field::After,       Field::Overrun,  Field::Priority,
-                                    Field::Execution,  Field::Callback,    Field::OnBudget, Field::WcetLow};
+constexpr std::array kTaskFields = {
+    Field::Name,       Field::Wcet,    Field::Bcet,    Field::Period,      Field::Deadline,  Field::Offset,
+    Field::Jitter,     Field::Region,  Field::Budget,  Field::Concurrency, Field::Group,     Field::Criticality,
+    Field::Activation, Field::After,   Field::Overrun, Field::Priority,    Field::Execution, Field::Callback,
+    Field::OnBudget,   Field::WcetLow, Field::Segments};
 
 constexpr std::array kCriticalities = {Criticality::Low, Criticality::Normal, Criticality::High};
 constexpr std::array kOnBudgets = {OnBudget::Abort, OnBudget::Log, OnBudget::Demote, OnBudget::SkipNext};
@@ -161,12 +161,14 @@ class Reader : private yaml::ValueReader {
     platform_.node = find(root_, Field::Platform);
     if (platform_.node == nullptr) return;
     if (!check_map(*platform_.node, "platform", names_of(kPlatformFields))) {
-      root_.broken |= FieldSet(Field::Workers) | Field::Preemption | Field::Clusters;
+      root_.broken |= FieldSet(Field::Workers) | Field::Preemption | Field::Clusters | Field::Devices;
       return;
     }
     take_count(platform_, Field::Workers, workload_.platform.workers, kMaxWorkers);
     read_clusters();
     take_enum(platform_, Field::Preemption, workload_.platform.preemption, kPreemptionModes);
+    take(platform_, Field::Devices, workload_.platform.devices,
+         [this](const Node &value, std::string_view) { return devices(value); });
     root_.broken |= platform_.broken;
   }
 
@@ -272,6 +274,7 @@ class Reader : private yaml::ValueReader {
   }
 
   void take_wcet(Task &task, TaskPart &part) {
+    if (const Node *segments = find(part, Field::Segments)) return take_segments(*segments, task, part);
     const bool is_callback = find(part, Field::Callback) != nullptr;
     if (is_callback && options_.wcet_optional) {
       take_positive_duration(part, Field::Wcet, task.wcet);
@@ -284,6 +287,23 @@ class Reader : private yaml::ValueReader {
               ? "run the node with learning and save the measured value, or add 'wcet:', the worst-case execution time"
               : "add 'wcet:', the worst-case execution time");
     part.broken |= Field::Wcet;
+  }
+
+  void take_segments(const Node &node, Task &task, TaskPart &part) {
+    if (const Node *wcet = find(part, Field::Wcet)) {
+      error(*wcet, fmt::format("task '{}' has both 'wcet' and 'segments'", task.name),
+            "its wcet is the sum of its cpu segments: remove 'wcet:'");
+      part.broken |= Field::Wcet;
+    }
+    // Without the devices, an unknown name would be a second mistake.
+    std::optional<Segments> read;
+    if (!platform_.broken.intersects(Field::Devices)) read = segments(node, workload_.platform.devices);
+    if (!read) {
+      part.broken |= FieldSet(Field::Segments) | Field::Wcet;
+      return;
+    }
+    task.wcet = read->wcet;
+    task.waits = std::move(read->waits);
   }
 
   void take_period(Task &task, TaskPart &part, Duration inherited, FieldSet dag_broken) {
@@ -449,7 +469,9 @@ class Reader : private yaml::ValueReader {
         const DagPart &dag = dags_[finding.dag.value];
         part = finding.task == Finding::kNone ? static_cast<const Part *>(&dag) : &dag.tasks[finding.task];
         unknown = part->broken;
-        if (finding.field == Field::Priority || finding.involves.intersects(Field::Clusters)) unknown |= root_.broken;
+        if (finding.field == Field::Priority || finding.involves.intersects(Field::Clusters | Field::Devices)) {
+          unknown |= root_.broken;
+        }
       }
       if (finding.involves.intersects(unknown)) continue;
       const Node &at = place(finding, *part);
@@ -459,13 +481,16 @@ class Reader : private yaml::ValueReader {
   }
 
   const Node &place(const Finding &finding, const Part &part) const {
-    const bool of_platform =
-        finding.field == Field::Workers || finding.field == Field::Preemption || finding.field == Field::Clusters;
+    const bool of_platform = finding.field == Field::Workers || finding.field == Field::Preemption ||
+                             finding.field == Field::Clusters || finding.field == Field::Devices;
     const Part &holder = of_platform && platform_.node != nullptr ? platform_ : part;
     const Node *value = holder.node->kind == Node::Kind::Map ? find(holder, finding.field) : nullptr;
     if (value == nullptr) return *part.node;
     if (finding.item == Finding::kNone) return *value;
     if (finding.field == Field::Clusters) return value->children[finding.item];
+    // A map of keys and values; waits stand between cpu segments.
+    if (finding.field == Field::Devices) return value->children[2 * finding.item];
+    if (finding.field == Field::Segments) return value->children[2 * finding.item + 1];
     if (finding.field == Field::After) return *dags_[finding.dag.value].tasks[finding.task].edges[finding.item];
     if (finding.field == Field::Callback) {
       const Callback &callback = *workload_.dags[finding.dag.value].tasks[finding.task].callback;

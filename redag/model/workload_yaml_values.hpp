@@ -55,6 +55,15 @@ class ValueReader {
   std::optional<ExecutionTime> execution(const Node &node);
   std::optional<Callback> callback(const Node &node);
 
+  /// What `segments:` of a task says.
+  struct Segments {
+    Duration wcet = 0;  // the sum of the cpu segments; above kMaxDuration if it is too large
+    std::vector<Wait> waits;
+  };
+  /// Reads a cpu segment, then waits and cpu segments in turn. `devices` are those of the platform.
+  std::optional<Segments> segments(const Node &node, const std::vector<Device> &devices);
+  std::optional<std::vector<Device>> devices(const Node &node);
+
   template <class Integer>
   std::optional<Integer> integer(const Node &node, std::string_view key, Integer smallest,
                                  Integer largest = std::numeric_limits<Integer>::max()) {
@@ -90,6 +99,8 @@ class ValueReader {
   std::optional<ExecutionTime> normal_execution(const Node &node);
   std::optional<ExecutionTime> empirical_execution(const Node &node);
   bool counted_callback(const Node &node, Callback &callback);
+  std::optional<Duration> cpu_segment(const Node &node);
+  std::optional<Wait> wait_segment(const Node &node, const std::vector<Device> &devices);
 
   // Many wrong names among many candidates would take quadratic time. After this many comparisons there are no more
   // hints.

@@ -100,6 +100,31 @@ void write_degrade(Writer &out, const Degrade &degrade) {
   out.end_map();
 }
 
+void write_segments(Writer &out, const Platform &platform, const Task &task) {
+  out.text(to_string(Field::Segments));
+  out.begin_list(Layout::OneLine);
+  const auto write_cpu = [&out](Duration length) {
+    out.begin_map(Layout::OneLine);
+    out.write("cpu", format_duration(length));
+    out.end_map();
+  };
+  Duration before = 0;
+  for (const Wait &wait : task.waits) {
+    write_cpu(wait.after - before);
+    before = wait.after;
+    out.begin_map(Layout::OneLine);
+    if (wait.device.valid()) {
+      REDAG_CHECK(wait.device.value < platform.devices.size(), "to_yaml() needs a valid workload");
+      out.write("device", platform.devices[wait.device.value].name);
+    }
+    out.write(wait.device.valid() ? "for" : "wait", format_duration(wait.longest));
+    if (wait.shortest != 0) out.write("at_least", format_duration(wait.shortest));
+    out.end_map();
+  }
+  write_cpu(task.wcet - before);
+  out.end_list();
+}
+
 void write_callback(Writer &out, const Callback &callback) {
   out.text(to_string(Field::Callback));
   out.begin_map();
@@ -118,12 +143,16 @@ void write_callback(Writer &out, const Callback &callback) {
   out.end_map();
 }
 
-void write_task(Writer &out, const Dag &dag, const Task &task, Duration dag_period) {
+void write_task(Writer &out, const Platform &platform, const Dag &dag, const Task &task, Duration dag_period) {
   const bool has_timer = task.callback && task.callback->period != 0;
   const Duration implied_period = has_timer ? task.callback->period : dag_period;
   out.begin_map(Layout::OneLine);
   write(out, Field::Name, task.name);
-  write_duration(out, Field::Wcet, task.wcet);
+  if (task.waits.empty()) {
+    write_duration(out, Field::Wcet, task.wcet);
+  } else {
+    write_segments(out, platform, task);
+  }
   write_duration(out, Field::WcetLow, task.wcet_low);
   write_duration(out, Field::Bcet, task.bcet);
   write_execution(out, task);
@@ -150,7 +179,8 @@ void write_task(Writer &out, const Dag &dag, const Task &task, Duration dag_peri
 
 void write_platform(Writer &out, const Platform &platform) {
   out.text(to_string(Field::Platform));
-  out.begin_map(platform.clusters.empty() ? Layout::OneLine : Layout::Lines);
+  const bool is_short = platform.clusters.empty() && platform.devices.empty();
+  out.begin_map(is_short ? Layout::OneLine : Layout::Lines);
   if (platform.clusters.empty()) {
     write(out, Field::Workers, platform.workers);
   } else {
@@ -166,10 +196,22 @@ void write_platform(Writer &out, const Platform &platform) {
     out.end_list();
   }
   write(out, Field::Preemption, to_string(platform.preemption));
+  if (!platform.devices.empty()) {
+    out.text(to_string(Field::Devices));
+    out.begin_map();
+    for (const Device &device : platform.devices) {
+      out.text(device.name);
+      out.begin_map(Layout::OneLine);
+      out.write("slots", device.slots);
+      out.write("queue", to_string(device.queue));
+      out.end_map();
+    }
+    out.end_map();
+  }
   out.end_map();
 }
 
-void write_dag(Writer &out, const Dag &dag) {
+void write_dag(Writer &out, const Platform &platform, const Dag &dag) {
   const Duration period = common_period(dag);
   out.begin_map();
   write(out, Field::Name, dag.name);
@@ -182,7 +224,7 @@ void write_dag(Writer &out, const Dag &dag) {
   write_degrade(out, dag.degrade);
   out.text(to_string(Field::Tasks));
   out.begin_list();
-  for (const Task &task : dag.tasks) write_task(out, dag, task, period);
+  for (const Task &task : dag.tasks) write_task(out, platform, dag, task, period);
   out.end_list();
   out.end_map();
 }
@@ -198,7 +240,7 @@ std::string to_yaml(const Workload &workload) {
   if (workload.ties != Ties::Share) write(out, Field::Ties, to_string(workload.ties));
   out.text(to_string(Field::Dags));
   out.begin_list();
-  for (const Dag &dag : workload.dags) write_dag(out, dag);
+  for (const Dag &dag : workload.dags) write_dag(out, workload.platform, dag);
   out.end_list();
   out.end_map();
   return out.take();

@@ -15,12 +15,16 @@ namespace redag::sched {
 inline constexpr std::uint32_t kNil = 0xffffffff;  // no slot, in the links of intrusive containers
 
 // Free -> Waiting -> Ready -> Running <-> Suspended -> Free; a skipped job goes from Waiting or Ready to Free.
+// Running -> [Queued ->] Away -> Woken -> Running while the job waits without a worker.
 enum class JobState : std::uint8_t {
   Free,       // the slot holds no job
   Waiting,    // released; waits for predecessors
   Ready,      // not started; in the ready queue, or parked at a gate that is full
   Running,    // has a worker
   Suspended,  // started, lost its worker: in the ready queue (Full) or under another job on its worker (Cooperative)
+  Queued,     // asked a device that does not serve it yet: in the device's queue
+  Away,       // a device serves it, or it waits without a device
+  Woken,      // its wait is over: in the ready queue
 };
 
 // The alignment keeps a job within two cache lines.
@@ -43,8 +47,9 @@ struct alignas(32) Job {
   // Links of the container that holds the job: the ready queue or a gate's heap.
   std::uint32_t next = kNil;
   std::uint32_t previous = kNil;
-  std::uint32_t child = kNil;      // HeapQueue: the first child; LevelQueue: the number of the list
-  std::uint32_t parked_at = kNil;  // the gate where it is parked, or kNil
+  std::uint32_t child = kNil;  // HeapQueue: the first child; LevelQueue: the number of the list
+  // The gate where a ready job is parked, or the device of a job that is Queued or Away; kNil: none.
+  std::uint32_t parked_at = kNil;
 
   std::uint32_t task_next = kNil;  // next unstarted job of the same task
   std::uint32_t under = kNil;      // Cooperative: the job suspended below this one
@@ -53,7 +58,7 @@ struct alignas(32) Job {
   bool deferred = false;
   bool demoted = false;  // comes after all other jobs, unless it inherits
 
-  [[nodiscard]] bool started() const { return state == JobState::Running || state == JobState::Suspended; }
+  [[nodiscard]] bool started() const { return state >= JobState::Running; }
 };
 
 static_assert(sizeof(Job) == 96, "a job in at most two cache lines");

@@ -77,9 +77,10 @@ TaskId JobTable::add_state(DagId dag, std::uint32_t rank, const Task &task) {
 // Reserves room for what one instant can bring. That is, for each task: a release, the skip of its last job, readiness,
 // deferral, start and preemption. HI mode can skip or demote every job, and a late timer reports many releases at once.
 void JobTable::reserve_step() {
-  // Any started job can change its level.
-  const std::size_t dispatches = 3 * std::size_t{config.workers} + jobs.size() + 16;
-  step.reserve(dispatches, 3 * (jobs.size() + kMostReleasesAtOnce) + 64);
+  // Any started job can change its level, and any can be woken or begin to be served.
+  const std::size_t waits = devices.empty() ? 0 : jobs.size();
+  const std::size_t dispatches = 3 * std::size_t{config.workers} + jobs.size() + waits + 16;
+  step.reserve(dispatches, 3 * (jobs.size() + kMostReleasesAtOnce) + 2 * waits + 64);
 }
 
 void JobTable::collect() {

@@ -144,6 +144,24 @@ class JobTable {
     step.emit(job, JobEventKind::Resumed, 0);
     step.tell(job, JobSlot(slot), DispatchKind::Resume, JobSlot(over), level);
   }
+  void wait(std::uint32_t slot, DeviceId device) {
+    Job &job = jobs[slot];
+    job.state = device.valid() ? JobState::Queued : JobState::Away;
+    job.parked_at = device.valid() ? device.value : kNil;
+    step.emit(job, JobEventKind::Waits, event_value(job));
+  }
+  void serve(std::uint32_t slot) {
+    Job &job = jobs[slot];
+    job.state = JobState::Away;
+    step.emit(job.task, job.number, WorkerId(), JobEventKind::Served, event_value(job));
+    step.tell_service(job, JobSlot(slot));
+  }
+  void wake(std::uint32_t slot) {
+    Job &job = jobs[slot];
+    step.emit(job.task, job.number, WorkerId(), JobEventKind::Woken, event_value(job));
+    job.state = JobState::Woken;
+    job.parked_at = kNil;
+  }
   /// Records for the driver that a started job, running or suspended, has a new level. It replaces an earlier one of
   /// the same step. Therefore no step outgrows its storage.
   void change_level(std::uint32_t slot, std::uint32_t level) {
@@ -180,6 +198,7 @@ class JobTable {
   std::vector<Job> jobs;         // by JobSlot
   std::vector<TaskState> tasks;  // by TaskId
   std::vector<DagState> dags;    // by DagId
+  std::vector<Device> devices;   // by DeviceId; set before the first DAG is added
   Precedence precedence;
   StepBuilder step;
   bool high_mode = false;             // DAGs of lower criticality are degraded
@@ -194,6 +213,10 @@ class JobTable {
     std::uint32_t tasks = 0;  // 0: the position is free
   };
 
+  // The device of a job that waits, as events have it.
+  [[nodiscard]] static std::int64_t event_value(const Job &job) {
+    return job.parked_at == kNil ? -1 : std::int64_t{job.parked_at};
+  }
   TaskId add_state(DagId dag, std::uint32_t rank, const Task &task);
   void reserve_step();
   void retire(TaskId id);

@@ -47,6 +47,13 @@ concept HandsOver = requires(D dispatcher, const D &decided, const Job &job, std
   dispatcher.replace(slot, slot, std::uint32_t{});
 };
 
+/// A dispatcher whose jobs can wait without a worker. Both are called while the job is still in its old state.
+template <class D>
+concept LetsWait = requires(D dispatcher, std::uint32_t slot, DeviceId device) {
+  dispatcher.on_wait(slot, device);
+  dispatcher.on_wake(slot);
+};
+
 template <Dispatcher D>
 class Lifecycle final : public Scheduler {
  public:
@@ -67,6 +74,8 @@ class Lifecycle final : public Scheduler {
   void complete(JobSlot job, Time now, Outcome outcome) override;
   void preemption_point(JobSlot job, Time now) override;
   void exceed(JobSlot job, Limit limit, Time now) override;
+  void wait(JobSlot job, DeviceId device, Time now) override;
+  void wake(JobSlot job, Time now) override;
   Step dispatch(Time now, std::uint32_t most = kNoLimit) override;
   Step finish(JobSlot job, Time now, Outcome outcome, std::uint32_t most = kNoLimit) override;
   void record_only(EventKinds kinds) override { table_.step.record_only(kinds); }

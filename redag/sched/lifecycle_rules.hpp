@@ -103,6 +103,31 @@ void Lifecycle<D>::preemption_point(JobSlot job, Time now) {
 }
 
 template <Dispatcher D>
+void Lifecycle<D>::wait(JobSlot job, DeviceId device, Time now) {
+  if constexpr (LetsWait<D>) {
+    REDAG_CHECK(job.value < table_.jobs.size(), "a job waits that does not exist");
+    REDAG_CHECK(!device.valid() || device.value < table_.devices.size(),
+                "a job waits for a device that does not exist");
+    table_.step.begin(now);
+    dispatcher_.on_wait(job.value, device);
+  } else {
+    Scheduler::wait(job, device, now);
+  }
+}
+
+template <Dispatcher D>
+void Lifecycle<D>::wake(JobSlot job, Time now) {
+  if constexpr (LetsWait<D>) {
+    REDAG_CHECK(job.value < table_.jobs.size() && table_.jobs[job.value].state == JobState::Away,
+                "a job wakes that no device serves");
+    table_.step.begin(now);
+    dispatcher_.on_wake(job.value);
+  } else {
+    Scheduler::wake(job, now);
+  }
+}
+
+template <Dispatcher D>
 Step Lifecycle<D>::dispatch(Time now, std::uint32_t most) {
   table_.step.begin(now);
   dispatcher_.decide(most);
@@ -275,6 +300,7 @@ void Lifecycle<D>::skip_all(Reason reason, Predicate which) {
 
 template <Dispatcher D>
 void Lifecycle<D>::load(const Workload &workload) {
+  table_.devices = workload.platform.devices;
   for (const Dag &dag : workload.dags) table_.append_dag(dag);
   reprioritise();
 }

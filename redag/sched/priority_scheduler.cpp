@@ -17,7 +17,8 @@ PriorityDispatcher::PriorityDispatcher(JobTable &table)
     : table_(table),
       static_(is_static(table.config.policy)),
       workers_(table.config.workers),
-      free_workers_(table.config.workers) {
+      free_workers_(table.config.workers),
+      devices_(table) {
   REDAG_CHECK(table.config.workers > 0, "a platform has at least one worker");
   REDAG_CHECK(table.config.levels == 0 || static_, "limited levels need a static policy");
   open_workers_.reserve(table.config.workers);
@@ -48,6 +49,7 @@ inline void PriorityDispatcher::decide(std::uint32_t most) {
   }
   if (!open_workers_.empty()) close_open_workers();
   if (held_back_ != kNil) put_back();
+  if (devices_.has_news()) devices_.serve();
 }
 
 // The new job holds the gates that both tasks share in the place of the ended one, for which no job waits. A free
@@ -92,7 +94,7 @@ inline void PriorityDispatcher::decide(std::uint32_t most) {
 }
 
 // No more jobs may start. Holds this job back and lets dispatch() look past it for started jobs, as long as there are
-// some in the ready queue. Only full preemption keeps them there.
+// some in the ready queue.
 [[gnu::noinline]] bool PriorityDispatcher::set_aside(std::uint32_t slot) {
   if (queued_started_ == 0) return false;
   remove(slot);
@@ -259,13 +261,20 @@ void PriorityDispatcher::inherit(std::uint32_t holder_slot, const Job &waiter) {
 template <class Change>
 void PriorityDispatcher::rekey(std::uint32_t slot, Change change) {
   const Job &job = table_.jobs[slot];
-  const bool is_queued = job.state == JobState::Suspended && table_.config.preemption == Preemption::Full;
+  const bool is_queued = is_in_ready_queue(job);
   if (is_queued) remove(slot);
+  devices_.begin_rekey(slot);
   const std::uint32_t old_level = level_of(job);
   forget_least_urgent();
   change();
+  devices_.end_rekey(slot);
   if (is_queued) push(slot);
   tell_level(slot, old_level);
+}
+
+bool PriorityDispatcher::is_in_ready_queue(const Job &job) const {
+  return job.state == JobState::Woken ||
+         (job.state == JobState::Suspended && table_.config.preemption == Preemption::Full);
 }
 
 // Full: the operating system also schedules suspended jobs, by the last level that it was told. Cooperative: a
@@ -310,27 +319,58 @@ void PriorityDispatcher::on_withdrawn(std::uint32_t slot) {
 
 inline void PriorityDispatcher::on_end(std::uint32_t slot) {
   const Job &job = table_.jobs[slot];
-  Worker &worker = workers_[job.worker.value];
   --started_;
   if (slot == least_urgent_) forget_least_urgent();
-  if (job.state == JobState::Suspended) {
-    // On threads, the operating system ran the job although the scheduler counted it as preempted.
-    REDAG_CHECK(table_.config.preemption == Preemption::Full, "a job ended that is suspended under another");
-    remove(slot);
+  if (job.state == JobState::Running) {
+    leave_worker(job);
   } else {
-    worker.running = kNil;
-    worker.stack = job.under;
-    if (worker.stack == kNil) {
-      worker.open = false;
-      free_workers_.set(job.worker.value);
-    } else {
-      open(job.worker.value);
-    }
+    leave_queue(slot);
   }
   for_gates_of(job, [this](Gate &gate) {
     --gate.used;
     promote_one(gate);
   });
+}
+
+inline void PriorityDispatcher::leave_worker(const Job &job) {
+  Worker &worker = workers_[job.worker.value];
+  worker.running = kNil;
+  worker.stack = job.under;
+  if (worker.stack == kNil) {
+    worker.open = false;
+    free_workers_.set(job.worker.value);
+  } else {
+    open(job.worker.value);
+  }
+}
+
+// The started job has no worker. On threads, the operating system can run a job that counts as preempted.
+[[gnu::noinline]] void PriorityDispatcher::leave_queue(std::uint32_t slot) {
+  const Job &job = table_.jobs[slot];
+  if (is_in_ready_queue(job)) return remove(slot);
+  REDAG_CHECK(job.state != JobState::Suspended, "a job ended or waits that is suspended under another");
+  devices_.leave(slot);
+}
+
+// The job keeps its gates.
+void PriorityDispatcher::on_wait(std::uint32_t slot, DeviceId device) {
+  const Job &job = table_.jobs[slot];
+  const bool may_run_unseen = table_.config.preemption == Preemption::Full && is_in_ready_queue(job);
+  REDAG_CHECK(job.state == JobState::Running || may_run_unseen, "a job waits that does not run");
+  if (slot == least_urgent_) forget_least_urgent();
+  if (job.state == JobState::Running) {
+    leave_worker(job);
+  } else {
+    remove(slot);
+  }
+  table_.wait(slot, device);
+  if (device.valid()) devices_.join(slot);
+}
+
+void PriorityDispatcher::on_wake(std::uint32_t slot) {
+  devices_.leave(slot);
+  table_.wake(slot);
+  push(slot);
 }
 
 void PriorityDispatcher::open(std::uint32_t worker) {
@@ -356,11 +396,12 @@ inline void PriorityDispatcher::promote_one(Gate &gate) {
 // ---- the ready queue ----
 
 // Each level has a list for its started jobs, then one for each of its tiers. SCHED_FIFO continues a preempted thread
-// before it runs a new one of the same level, and the scheduler does the same.
+// before it runs a new one of the same level, and the scheduler does the same. In other modes, a woken job goes by the
+// order of jobs alone.
 inline std::uint32_t PriorityDispatcher::list_of(const Job &job) const {
   const auto key = static_cast<std::uint32_t>(job.key);
   const std::uint32_t level = level_of(job);
-  if (!job.started()) return key + level + 1;
+  if (!job.started() || table_.config.preemption != Preemption::Full) return key + level + 1;
   const std::uint32_t first = level_of_key_.empty() ? level : first_of_level_[key];
   return first + level;
 }
@@ -452,13 +493,14 @@ void PriorityDispatcher::on_reconfigured() {
 
   for (std::uint32_t slot = 0; slot < table_.jobs.size(); ++slot) {
     Job &job = table_.jobs[slot];
-    job.parked_at = kNil;
+    if (!job.started()) job.parked_at = kNil;
     if (job.state == JobState::Ready) push(slot);
     if (!job.started()) continue;
     tell_level(slot, kNil);
-    if (job.state == JobState::Suspended && table_.config.preemption == Preemption::Full) push(slot);
+    if (is_in_ready_queue(job)) push(slot);
     hold_gates(slot, job);
   }
+  devices_.rebuild();
 }
 
 }  // namespace redag::sched

@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "redag/sched/device_queues.hpp"
 #include "redag/sched/lifecycle.hpp"
 #include "redag/sched/ready_queue.hpp"
 
@@ -29,6 +30,8 @@ class PriorityDispatcher {
   void on_withdrawn(std::uint32_t slot);
   void on_end(std::uint32_t slot);
   void on_lowered(std::uint32_t slot);
+  void on_wait(std::uint32_t slot, DeviceId device);
+  void on_wake(std::uint32_t slot);
   void on_reconfigured();
   void on_preemption_point(std::uint32_t slot) { open(table_.jobs[slot].worker.value); }
   void decide(std::uint32_t most);
@@ -93,6 +96,9 @@ class PriorityDispatcher {
   void note_running(std::uint32_t slot);
   void note_replaced(std::uint32_t ended, std::uint32_t slot);
   void make_way(const Place &place);
+  void leave_worker(const Job &job);
+  void leave_queue(std::uint32_t slot);
+  [[nodiscard]] bool is_in_ready_queue(const Job &job) const;
   bool park_if_not_eligible(std::uint32_t slot, const Job &job);
   void park(std::uint32_t slot, GateKind kind, std::uint32_t position);
   void inherit(std::uint32_t holder, const Job &waiter);
@@ -146,7 +152,7 @@ class PriorityDispatcher {
   LevelQueue levels_;
   HeapQueue heap_;
   std::uint32_t first_ = kNil;
-  std::uint32_t queued_started_ = 0;  // started jobs in the ready queue; only full preemption puts them there
+  std::uint32_t queued_started_ = 0;  // started jobs in the ready queue: preempted (Full), or woken
   std::uint32_t started_ = 0;         // jobs started and unfinished
   // Where levels are limited: the level of each key, and the first key of that level. Empty: each tier is a level.
   std::vector<std::uint32_t> level_of_key_;
@@ -156,6 +162,7 @@ class PriorityDispatcher {
   std::vector<Worker> workers_;
   LevelBitmap free_workers_;
   std::vector<std::uint32_t> open_workers_;
+  DeviceQueues devices_;
   std::uint32_t least_urgent_ = kNil;  // Full: the least urgent running job; kNil: not known
   std::uint32_t held_back_ = kNil;     // during decide(): held-back jobs, linked by Job::next; they may not start
 };

@@ -12,6 +12,7 @@
 #include <initializer_list>
 #include <span>
 
+#include "redag/base/check.hpp"
 #include "redag/model/job_event.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/sched/config.hpp"
@@ -68,6 +69,7 @@ enum class DispatchKind : std::uint8_t {
   Start,   // the job begins on `worker`
   Resume,  // the job, suspended until now, continues on `worker`
   Level,   // the started job keeps its state, running or suspended, and has a new level
+  Serve,   // the device that the job asked begins to serve it; it has no worker, and `level` is not set
 };
 
 /// One decision, effective now. If one step has several for a job, the last one holds.
@@ -119,6 +121,13 @@ class Scheduler {
   /// Returns true in HI mode: DAGs of lower criticality are degraded.
   [[nodiscard]] virtual bool high_mode() const = 0;
 
+  /// Reports that a running job left its worker to wait for `device`, or for something else if that is invalid. A
+  /// dispatch() tells when the device begins to serve it. With full preemption, it may count as preempted.
+  virtual void wait(JobSlot job, DeviceId device, Time now);
+  /// Reports that the wait of a job is over: its device has served it, or what it waited for has happened. It then
+  /// waits for a worker, in its old place in the order of jobs. A job that waits can also end, by complete().
+  virtual void wake(JobSlot job, Time now);
+
   /// Takes the decisions. A second call without a new event yields nothing. At most `most` jobs are started. Once that
   /// many are, dispatch() ignores the other unstarted jobs, and started ones continue as if those did not exist.
   virtual Step dispatch(Time now, std::uint32_t most = kNoLimit) = 0;
@@ -168,5 +177,13 @@ class Scheduler {
   /// How often a job found a worker and only Config::max_started kept it from starting.
   [[nodiscard]] virtual std::uint64_t thread_waits() const { return 0; }
 };
+
+inline void Scheduler::wait(JobSlot /*job*/, DeviceId /*device*/, Time /*now*/) {
+  REDAG_CHECK(false, "a job waits, which this scheduler does not know");
+}
+
+inline void Scheduler::wake(JobSlot /*job*/, Time /*now*/) {
+  REDAG_CHECK(false, "a job wakes, which this scheduler does not know");
+}
 
 }  // namespace redag::sched

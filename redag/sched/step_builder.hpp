@@ -106,6 +106,17 @@ class StepBuilder {
                              .level = level});
   }
 
+  /// Tells that a device begins to serve the job.
+  void tell_service(const Job &job, JobSlot slot) {
+    Dispatch &told = dispatches_.emplace_back();
+    told.job = slot;
+    told.task = job.task;
+    told.number = job.number;
+    told.release = job.release;
+    told.origin = job.origin;
+    told.kind = DispatchKind::Serve;
+  }
+
   /// Drops the changes of level that the step has for this job.
   void drop_level(JobSlot slot) {
     dispatches_.remove_if([slot](const Dispatch &d) { return d.kind == DispatchKind::Level && d.job == slot; });

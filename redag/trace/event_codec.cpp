@@ -13,7 +13,10 @@ namespace redag::trace {
 namespace {
 
 constexpr unsigned kReasonBits = 4;  // the upper bits of the byte that has kind and reason
-static_assert(static_cast<unsigned>(kLastJobEventKind) < 16 && static_cast<unsigned>(kLastReason) < 16);
+// Kinds from this one on have no reason. Their byte has this kind, and their distance from it as its reason.
+constexpr unsigned kFirstLateKind = 15;
+static_assert(static_cast<unsigned>(kLastJobEventKind) < kFirstLateKind + 16 &&
+              static_cast<unsigned>(kLastReason) < 16);
 
 // Small differences of either sign become small numbers: 0, -1, 1, -2 are 0, 1, 2, 3. Differences wrap around.
 constexpr std::uint64_t fold(std::uint64_t difference) { return (difference << 1U) ^ (0 - (difference >> 63U)); }
@@ -65,6 +68,8 @@ class CodeReader {
   const char *end_;
 };
 
+constexpr bool is_late_kind(JobEventKind kind) { return static_cast<unsigned>(kind) >= kFirstLateKind; }
+
 // The place of a kind in Expected::value; 3: there is none.
 constexpr std::size_t place_of(JobEventKind kind) {
   switch (kind) {
@@ -81,6 +86,7 @@ EventCodec::EventCodec(std::size_t tasks) : tasks_(tasks) {}
 
 bool EventCodec::is_event(const JobEvent &event) const {
   return event.task.value < tasks_.size() && event.kind <= kLastJobEventKind && event.reason <= kLastReason &&
+         (event.reason == Reason::None || !is_late_kind(event.kind)) &&
          (event.worker == WorkerId::kNoneValue || event.worker < kMaxWorkers) && has_valid_times(event);
 }
 
@@ -113,7 +119,8 @@ void EventCodec::encode(std::span<const JobEvent> events, Time base, std::string
   put(events.size(), out);
   for (const JobEvent &event : events) {
     const auto kind = static_cast<unsigned>(event.kind);
-    out.push_back(static_cast<char>(kind | (static_cast<unsigned>(event.reason) << kReasonBits)));
+    const unsigned upper = is_late_kind(event.kind) ? kind - kFirstLateKind : static_cast<unsigned>(event.reason);
+    out.push_back(static_cast<char>(std::min(kind, kFirstLateKind) | (upper << kReasonBits)));
   }
   Time time = base;
   for (const JobEvent &event : events) {
@@ -147,8 +154,10 @@ bool EventCodec::decode(std::string_view code, Time base, std::vector<JobEvent> 
   for (JobEvent &event : events) {
     std::uint8_t both = 0;
     if (!in.byte(both)) return false;
-    event.kind = static_cast<JobEventKind>(both & 0xfU);
-    event.reason = static_cast<Reason>(both >> kReasonBits);
+    const unsigned lower = both & 0xfU;
+    const unsigned upper = static_cast<unsigned>(both) >> kReasonBits;
+    event.kind = static_cast<JobEventKind>(lower < kFirstLateKind ? lower : lower + upper);
+    event.reason = static_cast<Reason>(lower < kFirstLateKind ? upper : 0);
   }
   auto time = static_cast<std::uint64_t>(base);
   for (JobEvent &event : events) {

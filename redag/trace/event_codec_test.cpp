@@ -24,7 +24,9 @@ JobEvent random_event(Rng &rng) {
   event.job = static_cast<std::uint32_t>(rng());
   event.worker = rng.uniform(0, 2) == 0 ? WorkerId::kNoneValue : static_cast<std::uint32_t>(rng.uniform(0, 4095));
   event.kind = static_cast<JobEventKind>(rng.uniform(0, static_cast<int>(kLastJobEventKind)));
-  event.reason = static_cast<Reason>(rng.uniform(0, static_cast<int>(kLastReason)));
+  event.kind = static_cast<JobEventKind>(rng.uniform(0, static_cast<int>(kLastJobEventKind)));
+  const bool has_reasons = event.kind < JobEventKind::Served;  // of later kinds the code has no reason
+  event.reason = has_reasons ? static_cast<Reason>(rng.uniform(0, static_cast<int>(kLastReason))) : Reason::None;
   return event;
 }
 

@@ -47,7 +47,7 @@ EventsWriter::EventsWriter(EventsWriter &&) noexcept = default;
 EventsWriter::~EventsWriter() = default;
 
 Result<EventsWriter> EventsWriter::create(const std::string &path, const RunInfo &info) {
-  Diagnostics mistakes = validate(info.workload, {.wcet_optional = true});
+  Diagnostics mistakes = validate(info.workload, {.wcet_optional = true, .waits = true});
   if (has_errors(mistakes)) return tl::unexpected<Diagnostics>(std::move(mistakes));
   Result<OutputFile> file = OutputFile::create(path);
   if (!file) return tl::unexpected<Diagnostics>(std::move(file.error()));

@@ -73,7 +73,7 @@ tl::unexpected<Diagnostics> system_error(const std::string &file, const char *wh
 }
 
 Result<void> write_info(const std::string &folder, const RunInfo &info, std::span<const std::uint32_t> positions) {
-  Diagnostics mistakes = validate(info.workload, {.wcet_optional = true});
+  Diagnostics mistakes = validate(info.workload, {.wcet_optional = true, .waits = true});
   if (has_errors(mistakes)) return tl::unexpected<Diagnostics>(std::move(mistakes));
   Result<OutputFile> file = OutputFile::create(info_path(folder));
   if (!file) return tl::unexpected<Diagnostics>(std::move(file.error()));

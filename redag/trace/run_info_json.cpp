@@ -194,7 +194,7 @@ Result<RunInfo> run_info_from_json(std::string_view text, const std::string &fil
     if (!json.is_object()) return file_error(file, line, "the description of the run must be an object");
     RunInfo info = info_from(json);
     Result<LoadedWorkload> loaded =
-        parse_workload(text_of(json, "workload"), file + " (workload)", {.wcet_optional = true});
+        parse_workload(text_of(json, "workload"), file + " (workload)", {.wcet_optional = true, .waits = true});
     if (!loaded) return tl::unexpected<Diagnostics>(std::move(loaded.error()));
     info.workload = std::move(loaded->workload);
     info.event_tasks = event_tasks_from(json, info.workload.task_count());

@@ -13,7 +13,8 @@
 
 namespace redag::trace {
 
-/// Returns one line without a line break. Requires that validate(info.workload, {.wcet_optional = true}) has no errors.
+/// Returns one line without a line break. Requires that validate(info.workload) finds no errors but a missing wcet, and
+/// allows waits.
 [[nodiscard]] std::string run_info_to_json(const RunInfo &info);
 
 /// Reads run_info_to_json(). Errors (missing or ill-typed keys, an invalid workload) name `file` and `line`.

@@ -29,7 +29,8 @@ Outcome apply_within(const TaskSet &task_set, const Method &method, const Effort
 MethodReport run(const TaskSet &task_set, const Method &method, const Effort::Limits &limits) {
   MethodReport report;
   report.method = &method;
-  const bool is_covered = task_set.not_analysable.empty() || (task_set.has_modes && method.knows_modes);
+  const bool is_covered = task_set.not_analysable.empty() || (task_set.has_modes && method.knows_modes) ||
+                          (task_set.has_waits && method.knows_waits);
   report.outcome = is_covered ? apply_within(task_set, method, limits) : NotApplicable{task_set.not_analysable};
   if (const Bound *bound = report.bound()) {
     report.verdict = verdict(task_set, *bound);

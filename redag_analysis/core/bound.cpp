@@ -33,6 +33,7 @@ const char *to_string(Term::Kind kind) {
     case Term::Kind::Interference: return "interference";
     case Term::Kind::Jitter: return "jitter";
     case Term::Kind::Wait: return "wait";
+    case Term::Kind::Suspended: return "suspended";
     case Term::Kind::Overhead: return "overhead";
     case Term::Kind::Waiting: return "waiting";
   }

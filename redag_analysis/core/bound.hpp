@@ -26,6 +26,7 @@ struct Term {
     Interference,  // more urgent work
     Jitter,        // the time by which the release is seen late
     Wait,          // waiting for data of predecessors of other rates; for a DAG, also the age of that data
+    Suspended,     // waits of the task or its unit without a worker, with the time in queues of devices
     Overhead,      // the platform's overhead for this job; the terms of others include their own
     Waiting,       // waiting for workers, predecessors and releases together, where it cannot be attributed
   };
@@ -92,6 +93,7 @@ struct Method {
   std::string_view sound_only_if{};  // what the paper's own equations need to be sound; empty: nothing more
   bool quick = false;                // its time is about linear in the tasks, so it is worth asking first
   bool knows_modes = false;          // it applies where there is a HI mode (TaskSet::has_modes)
+  bool knows_waits = false;          // it is sound where waits count as execution (TaskSet::has_waits)
   std::function<Outcome(const TaskSet &task_set)> apply{};
 
   [[nodiscard]] bool is_paper() const { return !sound_only_if.empty(); }

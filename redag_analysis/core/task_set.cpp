@@ -12,6 +12,7 @@
 #include "redag/sched/policy.hpp"
 #include "redag_analysis/core/arithmetic.hpp"
 #include "redag_analysis/core/jobs_in_progress.hpp"
+#include "redag_analysis/core/waiting.hpp"
 
 namespace redag::analysis {
 namespace {
@@ -20,7 +21,8 @@ constexpr Duration kLongestSum = kUnbounded / 8;
 
 class Compiler {
  public:
-  Compiler(const Workload &workload, const AnalysisPlatform &platform) : workload_(workload) {
+  Compiler(const Workload &workload, const AnalysisPlatform &platform)
+      : workload_(workload), waits_(waiting_times(workload)) {
     task_set_.platform = platform;
     task_set_.policy = workload.policy;
     task_set_.ties = workload.ties;
@@ -51,6 +53,11 @@ class Compiler {
     if (lost_.per_second >= kSecond) refuse("stalls, releases and preemptions leave no processor time");
     task_set_.has_modes = task_set_.not_analysable.empty() && !modes_.empty();
     if (task_set_.has_modes) refuse(std::move(modes_));
+    if (!waits_.empty()) {
+      refuse(why_waits_are_not_covered(task_set_));
+      task_set_.has_waits = task_set_.not_analysable.empty();
+      refuse("jobs wait without a worker");
+    }
     return std::move(task_set_);
   }
 
@@ -154,6 +161,10 @@ class Compiler {
     const Duration overhead = pays ? add(lead, platform.preempt_overhead) : lead;
     compiled.wcet = lengthened(add(task.wcet, overhead));
     compiled.overhead = compiled.wcet - task.wcet;
+    if (!waits_.empty()) {
+      compiled.waits = waits_[task_set_.tasks.size()];
+      compiled.wcet = add(compiled.wcet, compiled.waits);
+    }
     compiled.wcet_low = task.wcet_low > 0 ? lengthened(add(task.wcet_low, overhead)) : compiled.wcet;
     compiled.bcet = add(std::max<Duration>(1, task.bcet), overhead);
     compiled.period = task.period;
@@ -355,6 +366,7 @@ class Compiler {
 
   std::string modes_;  // why there is a HI mode
   const Workload &workload_;
+  const std::vector<Duration> waits_;  // by TaskId; empty: no task waits
   TaskSet task_set_;
   Loss lost_;
   std::map<std::string, std::uint32_t> group_ids_;
@@ -437,7 +449,7 @@ Result<TaskSet> compile(const Workload &workload, const AnalysisPlatform &platfo
                 platform.timer_overhead, platform.stall.longest, platform.stall.per_second}) < 0) {
     return make_error("an overhead must not be negative");
   }
-  Diagnostics mistakes = validate(workload);
+  Diagnostics mistakes = validate(workload, {.waits = true});
   if (has_errors(mistakes)) return tl::unexpected<Diagnostics>(std::move(mistakes));
   if (Result<void> one = refuse_clusters(workload, "a bound"); !one) return tl::unexpected(std::move(one.error()));
   return Compiler(workload, platform).run();

@@ -70,10 +70,11 @@ struct CompiledTask {
   std::string name;  // "dag.task"
   DagId dag;
   std::uint32_t unit = 0;
-  Duration wcet = 0;      // C with overheads
+  Duration wcet = 0;      // C with overheads and waits
   Duration wcet_low = 0;  // C(LO) with overheads, while wcet is C(HI); equal to wcet if the task has no `wcet_low`
   Duration bcet = 0;      // with overheads, > 0; only the exploration reads it: bounds hold for shorter executions
   Duration overhead = 0;  // the part of `wcet` that is overhead
+  Duration waits = 0;     // the part of `wcet` in which the job needs no worker (waiting.hpp)
   Duration period = 0;    // T, least distance of two nominal releases of the unit
   Duration offset = 0;    // a timer's own; a data task's is that of its grid (see Unit). Bounds of units without rate
                           // edges hold for all offsets
@@ -139,6 +140,9 @@ struct TaskSet {
   /// Some wcet_low is below its wcet: there is a HI mode, and not_analysable has no other reason. Methods that know
   /// modes (Method::knows_modes) apply.
   bool has_modes = false;
+  /// Jobs wait without a worker, and not_analysable has no other reason. Their waits count as execution, and methods
+  /// that are sound then (Method::knows_waits) apply.
+  bool has_waits = false;
 
   /// Time in which the machine can leave all jobs without a processor during any response time, besides the share that
   /// lengthens executions. The timers' jitter contains it, because a late and a longer window are equivalent
@@ -148,6 +152,8 @@ struct TaskSet {
   /// The platform's mode; None if it is cooperative and no task has a preemption point.
   sched::Preemption mode = sched::Preemption::Full;
 
+  /// True if no method applies.
+  [[nodiscard]] bool is_beyond_all() const { return !not_analysable.empty() && !has_modes && !has_waits; }
   [[nodiscard]] bool has_edges() const;       // some unit has edges
   [[nodiscard]] bool has_rate_edges() const;  // some unit awaits data of another
 };

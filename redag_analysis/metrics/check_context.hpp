@@ -46,6 +46,11 @@ class CheckContext {
     return execution_time(replay.task(task), ids_[task.value], number, info.seed);
   }
 
+  /// The simulated length of a wait.
+  [[nodiscard]] Duration wait_of(TaskId task, std::uint32_t number, std::size_t wait) const {
+    return wait_time(replay.task(task), ids_[task.value], number, wait, info.seed);
+  }
+
   [[nodiscard]] std::string job_name(TaskId task, std::uint32_t number) const {
     return trace::task_name(info.workload, task) + "#" + std::to_string(number);
   }

@@ -83,7 +83,8 @@ void DispatchRules::check_place(const JobEvent &event, const LiveJob &job) {
   if (stack.empty()) return;
   const LiveJob *below = replay.find(stack.back().task, stack.back().number);
   if (below == nullptr) return;
-  context_.expect(Rule::Preemption, replay.preempts(job.own, urgency_of(*below, job.own)), event.task, event.job,
+  context_.expect(Rule::Preemption, replay.preempts(job.raised, urgency_of(*below, job.raised, job.started())),
+                  event.task, event.job,
                   [&] { return "it runs on top of " + name(stack.back()) + ", which it does not outrank"; });
   context_.expect(Rule::Priority, replay.free_workers() == 0, event.task, event.job,
                   [&] { return "it runs on top of " + name(stack.back()) + ", although a worker is free"; });
@@ -103,7 +104,8 @@ void DispatchRules::check_eviction(const JobEvent &event, const LiveJob &by) {
   if (job == nullptr) return;
   // Where levels are shared, the job may inherit from one that was looked at only after the preemption. Its own level
   // therefore decides; what it inherits counts only in the order of priorities.
-  const bool outranked = replay.preempts(by.raised, job->own) && by.raised.key <= urgency_of(*job, by.raised).key;
+  const bool outranked =
+      replay.preempts(by.raised, job->own) && by.raised.key <= urgency_of(*job, by.raised, by.started()).key;
   context_.expect(Rule::Preemption, outranked, evicted.task, evicted.number, [&] {
     return "preempted by " + context_.job_name(by.task, by.number) + ", which does not outrank it";
   });
@@ -120,19 +122,20 @@ void DispatchRules::check_choice(const LiveJob &chosen, const Urgency &urgency) 
   // A resumed job (Cooperative) keeps its worker unless another outranks it by level.
   const bool goes_on = mode() == Preemption::Cooperative && chosen.state == State::Suspended;
   // A job that continues while no job may start passes the eligible ones.
-  const bool none_may_start = context_.info.stepped && chosen.state == State::Suspended;
+  const bool none_may_start = context_.info.stepped && chosen.started();
   if (!eligible.empty() && !none_may_start) {
     const Replay::Waiter &best = *eligible.begin();
     const bool is_itself = best.task == chosen.task && best.number == chosen.number;
     const bool outranks = goes_on ? replay.preempts(best.urgency, urgency)
-                                  : replay.goes_first(best.urgency, false, urgency, chosen.state == State::Suspended);
+                                  : replay.goes_first(best.urgency, false, urgency, chosen.started());
     if (!is_itself && outranks) complain(Replay::JobRef{best.task, best.number});
   }
-  if (mode() != Preemption::Full) return;
   for (const Replay::JobRef &ref : replay.suspended()) {
     if (ref == Replay::JobRef{chosen.task, chosen.number}) continue;
-    const Urgency other = urgency_of(*replay.find(ref.task, ref.number), urgency);
-    if (!replay.goes_first(other, true, urgency, chosen.state == State::Suspended)) continue;
+    const Urgency other = urgency_of(*replay.find(ref.task, ref.number), urgency, chosen.started());
+    const bool outranks =
+        goes_on ? replay.preempts(other, urgency) : replay.goes_first(other, true, urgency, chosen.started());
+    if (!outranks) continue;
     complain(ref);
     break;
   }
@@ -163,9 +166,10 @@ void DispatchRules::preempted(const JobEvent &event, const LiveJob &job) {
 }
 
 void DispatchRules::resumed(const JobEvent &event, const LiveJob &job) {
-  context_.expect(Rule::Preemption, mode() != Preemption::None, event.task, event.job,
+  context_.expect(Rule::Preemption, mode() != Preemption::None || job.state == State::Woken, event.task, event.job,
                   [] { return std::string("it was resumed on a platform without preemption"); });
-  if (job.state != State::Suspended) return;
+  if (job.state != State::Suspended && job.state != State::Woken) return;
+  if (job.state == State::Woken) check_place(event, job);
   check_eviction(event, job);
   check_choice(job, job.raised);
 }
@@ -175,6 +179,9 @@ void DispatchRules::ended(const JobEvent &event, const LiveJob &job) {
   const bool may_end_suspended = context_.info.driver != trace::Driver::Simulator && mode() == Preemption::Full;
   context_.expect(Rule::Life, job.state != State::Suspended || may_end_suspended, event.task, event.job,
                   [] { return std::string("it ended while it was preempted"); });
+  const bool may_end_waiting = context_.info.driver != trace::Driver::Simulator;
+  context_.expect(Rule::Life, (!job.is_waiting() && job.state != State::Woken) || may_end_waiting, event.task,
+                  event.job, [] { return std::string("it ended without a worker, while it waited"); });
   context_.expect(Rule::Life, event.value >= job.release && event.value <= event.time, event.task, event.job, [&] {
     return "it ended at " + format_duration(event.value) + ", before the least time that it needs";
   });
@@ -257,10 +264,12 @@ void DispatchRules::check_free_workers() {
   const auto suspended = replay.suspended();
   const Replay::JobRef preempted_job = suspended.empty() ? Replay::JobRef{} : suspended.front();
   context_.expect(Rule::WorkConservation, suspended.empty(), preempted_job.task, preempted_job.number,
-                  [] { return std::string("it is preempted, and a worker is free"); });
+                  [] { return std::string("it has started and needs a worker, and a worker is free"); });
   const auto &owed = replay.owed_deferral();
   const TaskId undeferred = owed.empty() ? TaskId() : *owed.begin();
-  context_.expect(Rule::Deferral, owed.empty() || context_.info.stepped, undeferred, 0, [] {
+  // A job that waits for a thread is not looked at until there is one. Waiting jobs hold threads, but no workers.
+  const bool is_looked_at = !context_.info.stepped && !replay.at_thread_limit();
+  context_.expect(Rule::Deferral, owed.empty() || !is_looked_at, undeferred, 0, [] {
     return std::string(
         "it was not deferred, although it is the first ready job and only max_active keeps it from a free worker");
   });
@@ -293,9 +302,9 @@ Urgency DispatchRules::urgency_of(const LiveJob &job) const {
   return context_.info.stepped ? job.own : context_.replay.inherited(job);
 }
 
-// The same at the time when a job of urgency `looked_at` is looked at.
-Urgency DispatchRules::urgency_of(const LiveJob &job, const Urgency &looked_at) const {
-  return context_.info.stepped ? job.own : context_.replay.inherited(job, looked_at);
+// The same at the time when a job of urgency `looked_at` is looked at, which has `started` or not.
+Urgency DispatchRules::urgency_of(const LiveJob &job, const Urgency &looked_at, bool started) const {
+  return context_.info.stepped ? job.own : context_.replay.inherited(job, looked_at, started);
 }
 
 const LiveJob *DispatchRules::most_urgent_suspended() const {

@@ -27,6 +27,7 @@ const char *to_string(Rule rule) {
     case Rule::Budget: return "budget";
     case Rule::Execution: return "execution";
     case Rule::Start: return "start";
+    case Rule::Device: return "device";
   }
   return "?";
 }

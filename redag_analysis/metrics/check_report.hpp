@@ -36,8 +36,9 @@ enum class Rule : std::uint8_t {
   Budget,            // a job that used its budget is told so; HI mode begins and ends by its rules
   Execution,         // simulator: a job held a worker for exactly its execution time
   Start,             // threads, full: a dispatched job's body begins before less urgent bodies run for long
+  Device,            // a job waits where its task does; devices serve in order, and are not idle while one waits
 };
-inline constexpr std::size_t kRuleCount = 18;
+inline constexpr std::size_t kRuleCount = 19;
 
 [[nodiscard]] const char *to_string(Rule rule);
 

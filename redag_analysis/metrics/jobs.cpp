@@ -80,6 +80,12 @@ void JobFolder::add(const JobEvent &event) {
       if (found->on_worker_since != kNever) record.on_worker += event.time - found->on_worker_since;
       found->on_worker_since = kNever;
       break;
+    case JobEventKind::Waits:
+      if (found->on_worker_since != kNever) record.on_worker += event.time - found->on_worker_since;
+      found->on_worker_since = kNever;
+      break;
+    case JobEventKind::Served:
+    case JobEventKind::Woken: break;
     case JobEventKind::Resumed: found->on_worker_since = event.time; break;
     case JobEventKind::Executed: record.processor = event.value; break;
     case JobEventKind::Exceeded: record.exceeded = true; break;

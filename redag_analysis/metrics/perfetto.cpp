@@ -80,6 +80,12 @@ class PerfettoWriter::Impl {
         break;
       case JobEventKind::Resumed: open_slice(event, *job); break;
       case JobEventKind::Preempted: close_slice(*job, event.time, {}); break;
+      case JobEventKind::Waits:
+        close_slice(*job, event.time, {});
+        mark(event, waits_for(event.value));
+        break;
+      case JobEventKind::Served: mark(event, "served"); break;
+      case JobEventKind::Woken: mark(event, "woken"); break;
       case JobEventKind::Started: begin_body(event, *job); break;
       default: break;  // the others are done above, or show nothing
     }
@@ -231,6 +237,12 @@ class PerfettoWriter::Impl {
 
   static std::uint64_t job_key(TaskId task, std::uint32_t number) {
     return (std::uint64_t{task.value} << 32U) | number;
+  }
+
+  [[nodiscard]] std::string waits_for(std::int64_t device) const {
+    const std::vector<Device> &devices = run_.workload.platform.devices;
+    const bool is_known = device >= 0 && device < static_cast<std::int64_t>(devices.size());
+    return is_known ? "waits for " + devices[static_cast<std::size_t>(device)].name : "waits";
   }
 
   void mark(const JobEvent &event, const std::string &name) {

@@ -133,10 +133,21 @@ const char *Replay::apply_to(LiveJob &job, const JobEvent &event) {
       move_to(job, State::Suspended);
       return problem;
     case JobEventKind::Resumed:
-      if (before != State::Suspended) return "only a preempted job can be resumed";
+      if (before != State::Suspended && before != State::Woken) return "only a preempted or woken job can be resumed";
       problem = take_worker(job, event);
       move_to(job, State::Running);
       return problem;
+    case JobEventKind::Waits: return begin_wait(job, event);
+    case JobEventKind::Served:
+      if (before != State::AtDevice) return "a device served it that it had not asked";
+      if (event.value != job.device) problem = "another device served it than the one that it had asked";
+      move_to(job, State::Away);
+      return problem;
+    case JobEventKind::Woken:
+      if (before != State::Away) return "it was woken, but did not wait or was not served";
+      suspended_.push_back(JobRef{job.task, job.number});
+      move_to(job, State::Woken);
+      return nullptr;
     case JobEventKind::Finished:
     case JobEventKind::Aborted:
       if (!job.started()) problem = "it ended without having started";
@@ -156,6 +167,19 @@ const char *Replay::apply_to(LiveJob &job, const JobEvent &event) {
       return problem;
   }
   return "the kind of the event is unknown";
+}
+
+// On real threads, with full preemption, the operating system runs jobs that count as preempted.
+const char *Replay::begin_wait(LiveJob &job, const JobEvent &event) {
+  const bool may_run_unseen =
+      config_.preemption == sched::Preemption::Full && (job.state == State::Suspended || job.state == State::Woken);
+  if (job.state != State::Running && !may_run_unseen) return "only a running job can wait";
+  if (job.state == State::Running) job.executed += event.time - job.on_worker_since;
+  const char *problem = leave_worker(job);
+  job.device = event.value;
+  ++job.waits;
+  move_to(job, event.value < 0 ? State::Away : State::AtDevice);
+  return problem;
 }
 
 // True for a timer task with predecessors: the turn of its jobs is their release, not the origin of their data.
@@ -236,7 +260,7 @@ const char *Replay::leave_worker(const LiveJob &job) {
   for (std::vector<JobRef> &stack : workers_) {
     const auto found = std::find(stack.begin(), stack.end(), ref);
     if (found == stack.end()) continue;
-    if (found + 1 != stack.end()) problem = "it ended under a job that runs on top of it";
+    if (found + 1 != stack.end()) problem = "it left its worker under a job that runs on top of it";
     stack.erase(found);
     if (stack.empty()) ++free_workers_;
     return problem;
@@ -369,8 +393,8 @@ Urgency Replay::inherited(const LiveJob &job) const {
   return inherited_from(job, [](const Urgency &) { return true; });
 }
 
-Urgency Replay::inherited(const LiveJob &job, const Urgency &looked_at) const {
-  return inherited_from(job, [&](const Urgency &waiter) { return waiter < looked_at; });
+Urgency Replay::inherited(const LiveJob &job, const Urgency &looked_at, bool started) const {
+  return inherited_from(job, [&](const Urgency &waiter) { return goes_first(waiter, false, looked_at, started); });
 }
 
 std::uint32_t Replay::level_of(const Urgency &urgency) const {

@@ -32,7 +32,8 @@ struct Urgency {
 
 struct LiveJob {
   // Waiting -> Ready -> Running <-> Suspended -> Ended; Waiting, Ready -> Ended.
-  enum class State : std::uint8_t { Waiting, Ready, Running, Suspended, Ended };
+  // Running -> (AtDevice ->) Away -> Woken -> Running: it waits without a worker, first in the queue of a device.
+  enum class State : std::uint8_t { Waiting, Ready, Running, Suspended, AtDevice, Away, Woken, Ended };
 
   TaskId task;
   std::uint32_t number = 0;
@@ -51,9 +52,12 @@ struct LiveJob {
   Urgency own;
   Urgency raised;  // own, with the key of the most urgent job that waited for its group while it held it
   Time on_worker_since = 0;
-  Duration executed = 0;  // up to the last event that changed its state
+  Duration executed = 0;     // up to the last event that changed its state
+  std::int64_t device = -1;  // of its last wait
+  std::uint32_t waits = 0;   // the number of its waits so far
 
-  [[nodiscard]] bool started() const { return state == State::Running || state == State::Suspended; }
+  [[nodiscard]] bool started() const { return state >= State::Running && state != State::Ended; }
+  [[nodiscard]] bool is_waiting() const { return state == State::AtDevice || state == State::Away; }
 };
 
 class Replay {
@@ -108,7 +112,7 @@ class Replay {
   [[nodiscard]] std::uint32_t free_workers() const { return free_workers_; }
   /// The job that executes on a worker; null if there is none.
   [[nodiscard]] const LiveJob *running(std::uint32_t worker) const;
-  /// Full preemption: started jobs that have no worker.
+  /// Started jobs that wait for a worker: preempted (full preemption) or woken.
   [[nodiscard]] std::span<const JobRef> suspended() const { return suspended_; }
 
   /// Eligible jobs, most urgent first; of each task its first ready one. Empty while `max_started` jobs are started.
@@ -127,9 +131,9 @@ class Replay {
   [[nodiscard]] bool is_passed_by_demotion(const LiveJob &job, const LiveJob &other) const;
   /// The urgency with what the job now inherits from those that wait for its group.
   [[nodiscard]] Urgency inherited(const LiveJob &job) const;
-  /// The same, but only from waiting jobs that come before `looked_at`. Jobs are looked at in their order; those after
-  /// `looked_at` have not yet handed on their priority.
-  [[nodiscard]] Urgency inherited(const LiveJob &job, const Urgency &looked_at) const;
+  /// The same, but only from waiting jobs that go before a job of urgency `looked_at`, which has `started` or not. Jobs
+  /// are looked at in their order; those after it have not yet handed on their priority.
+  [[nodiscard]] Urgency inherited(const LiveJob &job, const Urgency &looked_at, bool started) const;
   /// True if a job of this urgency may take the worker of one that runs with urgency `running`.
   [[nodiscard]] bool preempts(const Urgency &urgency, const Urgency &running) const;
   /// True if a worker that is free for both goes to the first job. The more urgent job goes first; within a level (full
@@ -164,6 +168,7 @@ class Replay {
   [[nodiscard]] bool waits_for_data(TaskId id) const;
   void hand_turn_on(const LiveJob &skipped, Reason reason);
   [[nodiscard]] std::uint32_t level_of(const Urgency &urgency) const;
+  const char *begin_wait(LiveJob &job, const JobEvent &event);
   const char *take_worker(LiveJob &job, const JobEvent &event);
   const char *leave_worker(const LiveJob &job);
   void move_to(LiveJob &job, LiveJob::State state);

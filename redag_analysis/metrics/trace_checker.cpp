@@ -12,6 +12,7 @@
 #include "redag/sched/cluster_config.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/check_context.hpp"
+#include "redag_analysis/metrics/check_device.hpp"
 #include "redag_analysis/metrics/check_dispatch.hpp"
 #include "redag_analysis/metrics/check_overload.hpp"
 #include "redag_analysis/metrics/check_release.hpp"
@@ -32,6 +33,7 @@ class Checker {
         context_(info_, part.tasks, replay_, rules, report),
         releases_(context_),
         decisions_(context_),
+        devices_(context_),
         overload_(context_),
         starts_(context_),
         counts_(info_.workload.task_count()) {}
@@ -54,6 +56,7 @@ class Checker {
     end_of_instant();
     releases_.end_of_trace();
     decisions_.end_of_trace();
+    devices_.end_of_trace();
     starts_.end_of_trace();
     check_conservation();
   }
@@ -103,6 +106,7 @@ class Checker {
 
     releases_.before(event);
     decisions_.before(event);
+    devices_.before(event);
     overload_.before(event);
     starts_.before(event);
     Counts &counts = counts_[event.task.value];
@@ -122,6 +126,7 @@ class Checker {
   void end_of_instant() {
     releases_.end_of_instant();
     decisions_.end_of_instant();
+    devices_.end_of_instant();
     overload_.end_of_instant();
   }
 
@@ -141,6 +146,7 @@ class Checker {
   CheckContext context_;
   ReleaseRules releases_;
   DispatchRules decisions_;
+  DeviceRules devices_;
   OverloadRules overload_;
   StartRules starts_;
   std::vector<Counts> counts_;

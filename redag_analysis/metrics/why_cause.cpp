@@ -24,6 +24,8 @@ const char *to_string(Cause cause) {
     case Cause::Overrun: return "overrun";
     case Cause::Overhead: return "overhead";
     case Cause::Preempted: return "preempted";
+    case Cause::DeviceQueue: return "device_queue";
+    case Cause::Waited: return "waited";
     case Cause::OffProcessor: return "off_processor";
     case Cause::OnWorker: return "on_worker";
     case Cause::OtherProgram: return "other_program";

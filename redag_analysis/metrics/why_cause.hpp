@@ -33,6 +33,8 @@ enum class Cause : std::uint8_t {
   Overrun,       // it executed beyond its wcet
   Overhead,      // simulated overheads
   Preempted,     // it had lost its worker to another job
+  DeviceQueue,   // it waited for a device, which served another job
+  Waited,        // a device served it, or it waited for something else without a worker
   OffProcessor,  // it had a worker and did not execute; the trace does not tell why
   OnWorker,      // it had a worker; the trace does not tell whether it executed
   // With the kernel's record
@@ -70,6 +72,6 @@ struct Part {
 [[nodiscard]] const char *to_string(Cause cause);
 
 /// True for time in which the job, or on the way of its data a predecessor, did what the workload asks for.
-[[nodiscard]] constexpr bool is_work(Cause cause) { return cause == Cause::Execution; }
+[[nodiscard]] constexpr bool is_work(Cause cause) { return cause == Cause::Execution || cause == Cause::Waited; }
 
 }  // namespace redag::metrics

@@ -43,6 +43,8 @@ std::string words(Cause cause, const std::string &by, const std::string &program
     case Cause::Overrun: return "executed beyond its wcet";
     case Cause::Overhead: return "simulated overheads";
     case Cause::Preempted: return fmt::format("preempted; {} ran", by);
+    case Cause::DeviceQueue: return fmt::format("its device served {}", by);
+    case Cause::Waited: return "waited without a worker, as its task does";
     case Cause::OffProcessor: return "had a worker and did not execute (the trace does not tell why)";
     case Cause::OnWorker: return "had a worker (the trace does not tell whether it executed)";
     case Cause::OtherProgram: return fmt::format("another program had the processor: {}", program);

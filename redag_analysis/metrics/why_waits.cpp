@@ -81,6 +81,9 @@ class ClusterWaits {
       case State::Ready: return not_started(job);
       case State::Running: return by(Cause::Execution, nullptr);
       case State::Suspended: return not_resumed(job);
+      case State::AtDevice: return at_device(job);
+      case State::Away: return by(Cause::Waited, nullptr);
+      case State::Woken: return occupied(job, Cause::Queued);
       case State::Ended: break;
     }
     return by(Cause::Unknown, nullptr);
@@ -124,6 +127,16 @@ class ClusterWaits {
     }
     if (replay_.at_thread_limit()) return by(Cause::NoThread, holder([](TaskId) { return true; }));
     return occupied(job, Cause::Queued);
+  }
+
+  // Names the first job that the device serves.
+  [[nodiscard]] Wait at_device(const LiveJob &job) const {
+    for (std::size_t t = 0; t < replay_.task_count(); ++t) {
+      for (const LiveJob &other : replay_.jobs_of(TaskId(t))) {
+        if (other.state == State::Away && other.device == job.device) return by(Cause::DeviceQueue, &other);
+      }
+    }
+    return by(Cause::Unknown, nullptr);
   }
 
   [[nodiscard]] Wait not_resumed(const LiveJob &job) const {

@@ -54,10 +54,15 @@ Duration stop_of(const Own &own, std::int64_t q) {
 std::vector<Term> terms_of(const TaskSet &task_set, const Unit &unit, const View &view,
                            const std::vector<std::uint32_t> &more_urgent, const Response &response, bool deferred) {
   Duration overhead = 0;
-  for (const std::uint32_t t : unit.tasks) overhead = add(overhead, task_set.tasks[t].overhead);
+  Duration waits = 0;
+  for (const std::uint32_t t : unit.tasks) {
+    overhead = add(overhead, task_set.tasks[t].overhead);
+    waits = add(waits, task_set.tasks[t].waits);
+  }
   std::vector<Term> terms;
   const TaskId self = unit.tasks.size() == 1 ? TaskId(unit.tasks.front()) : TaskId();
-  terms.push_back(Term{Term::Kind::Own, self, unit.dag, unit.volume - overhead, 1});
+  terms.push_back(Term{Term::Kind::Own, self, unit.dag, unit.volume - overhead - waits, 1});
+  if (waits > 0) terms.push_back(Term{Term::Kind::Suspended, self, unit.dag, waits, 0});
   if (overhead > 0) terms.push_back(Term{Term::Kind::Overhead, self, unit.dag, overhead, 0});
   if (response.job > 0) {
     const Duration earlier = response.job * (unit.volume - unit.period);

@@ -65,6 +65,7 @@ Method rta_preemptive() {
           "shared "
           "groups with priority inheritance, shared levels",
       .complexity = "pseudo-polynomial; O(n) per step",
+      .knows_waits = true,
       .apply = [](const TaskSet &task_set) { return across_rates(task_set, independent_full); },
   };
 }
@@ -110,6 +111,7 @@ Method dag_one_worker_preemptive() {
           "one worker, full preemption, static priorities; R <= T for DAGs; timers that keep their periods where edges "
           "join rates; jitter, groups with inheritance, shared levels, max_active",
       .complexity = "pseudo-polynomial; O(n) per step",
+      .knows_waits = true,
       .apply = [](const TaskSet &task_set) { return across_rates(task_set, dags_full); },
   };
 }

@@ -12,6 +12,7 @@
 #include "redag/base/int128.hpp"
 #include "redag/model/demand.hpp"
 #include "redag/model/release_queue.hpp"
+#include "redag/model/waits.hpp"
 #include "redag_analysis/sim/release_tree.hpp"
 
 namespace redag::sim {
@@ -30,8 +31,9 @@ class Simulation {
     const std::vector<std::uint32_t> places = places_of(workload);
     for (const TaskRef &ref : flatten(workload)) {
       const Task &task = *ref.task;
-      tasks_.push_back(task_state(task, places[ref.id.value]));
+      tasks_.push_back(task_state(task, ref.id, places[ref.id.value]));
       has_regions_ = has_regions_ || task.region > 0;
+      has_waits_ = has_waits_ || !task.waits.empty();
       has_limits_ = has_limits_ || task.wcet_low > 0 || (task.budget > 0 && task.on_budget != OnBudget::Abort);
       if (task.activation != Activation::Timer || task.offset >= options.horizon) continue;
       TimerRelease &release = tasks_.back().release;
@@ -44,12 +46,16 @@ class Simulation {
     if (!sink_) scheduler_.record_only({});
     bool goes_on = true;
     while (goes_on) {
-      const Time of_processors = next_processor_event();
-      const Time next = std::min(releases_.next(), of_processors);
-      if (next > options_.horizon || (next == options_.horizon && of_processors > next)) break;
+      const Time of_jobs = has_waits_ ? std::min(next_processor_event(), next_wait_event()) : next_processor_event();
+      const Time next = std::min(releases_.next(), of_jobs);
+      if (next > options_.horizon || (next == options_.horizon && of_jobs > next)) break;
       now_ = next;
-      if (of_processors == now_) complete_jobs();
+      if (of_jobs == now_) complete_jobs();
       if (has_limits_) reach_limits();
+      if (has_waits_) {
+        begin_waits();
+        end_waits();
+      }
       release_jobs();
       if (has_regions_) reach_preemption_points();
       goes_on = carry_out(scheduler_.dispatch(now_));
@@ -61,13 +67,18 @@ class Simulation {
  private:
   // A job's progress, by slot; valid while the job is started.
   struct Progress {
-    Duration left = 0;      // processor time until it ends, overheads included
+    Duration left = 0;      // processor time until it ends or waits, overheads included
     Duration executed = 0;  // up to its last loss of the processor
     Duration lead = 0;      // overheads; they come before the body and hold no preemption point
     Duration region = 0;
-    std::uint32_t place = 0;   // of its task in the static order
-    std::uint32_t number = 0;  // within its task
-    bool cut_off = false;      // it ends at its budget
+    std::uint32_t place = 0;    // of its task in the static order
+    std::uint32_t number = 0;   // within its task
+    bool cut_off = false;       // it ends at its budget
+    bool ends_in_wait = false;  // it waits once `left` is used up, and does not end
+    std::uint32_t next_wait = 0;
+    TaskId task;          // of a task with waits
+    Duration demand = 0;  // of the body; of a task with waits
+    Duration wait = 0;    // length of the wait that it began last
     // Processor time of the body that uses these up; kNever: not watched, or already reported.
     Duration budget = kNever;
     Duration wcet_low = kNever;
@@ -85,7 +96,14 @@ class Simulation {
     JobSlot job;
     Time since = 0;        // when the job last got the processor
     Time finish = kNever;  // if nothing intervenes
+    Time wait = kNever;    // the same, when the job next leaves the processor to wait
     Time point = kNever;   // the next preemption point that matters, or the next limit
+  };
+
+  // A job without a processor, which a device serves or which waits without one.
+  struct Away {
+    JobSlot job;
+    Time until = 0;
   };
 
   [[nodiscard]] Time next_processor_event() const {
@@ -94,6 +112,13 @@ class Simulation {
     if (has_regions_ || has_limits_) {
       for (const Processor &processor : processors_) next = std::min(next, processor.point);
     }
+    return next;
+  }
+
+  [[nodiscard]] Time next_wait_event() const {
+    Time next = kNever;
+    for (const Processor &processor : processors_) next = std::min(next, processor.wait);
+    for (const Away &away : away_) next = std::min(next, away.until);
     return next;
   }
 
@@ -118,13 +143,16 @@ class Simulation {
     }
     const std::span<Processor *> found = std::span(at_once_).first(count);
     if (found.size() > 1) {
-      std::sort(found.begin(), found.end(), [this](const Processor *a, const Processor *b) {
-        const Progress &x = progress_[a->job.value];
-        const Progress &y = progress_[b->job.value];
-        return x.place != y.place ? x.place < y.place : x.number < y.number;
-      });
+      std::sort(found.begin(), found.end(),
+                [this](const Processor *a, const Processor *b) { return comes_first(a->job, b->job); });
     }
     for (Processor *processor : found) tell(*processor);
+  }
+
+  [[nodiscard]] bool comes_first(JobSlot a, JobSlot b) const {
+    const Progress &x = progress_[a.value];
+    const Progress &y = progress_[b.value];
+    return x.place != y.place ? x.place < y.place : x.number < y.number;
   }
 
   void complete_jobs() {
@@ -136,6 +164,37 @@ class Simulation {
                     ++result_.finished;
                     scheduler_.complete(job, now_, cut_off ? sched::Outcome::BudgetExceeded : sched::Outcome::Finished);
                   });
+  }
+
+  void begin_waits() {
+    tell_in_order([this](const Processor &processor) { return processor.wait <= now_; },
+                  [this](Processor &processor) {
+                    const JobSlot job = processor.job;
+                    Progress &progress = progress_[job.value];
+                    progress.executed += now_ - processor.since;
+                    processor = Processor{};
+                    const Task &task = *tasks_[progress.task.value].task;
+                    const std::size_t wait = progress.next_wait++;
+                    progress.wait = options_.wait
+                                        ? options_.wait(task, progress.task, progress.number, wait)
+                                        : wait_time(task, progress.task, progress.number, wait, options_.seed);
+                    REDAG_CHECK(progress.wait > 0, "a wait has a positive length");
+                    const DeviceId device = task.waits[wait].device;
+                    set_stretch(progress, task, wait_point(task, wait, progress.demand));
+                    scheduler_.wait(job, device, now_);
+                    if (!device.valid()) go_away(job);
+                  });
+  }
+
+  // The wait of the job takes its time from now on.
+  void go_away(JobSlot job) { away_.push_back(Away{job, now_ + progress_[job.value].wait}); }
+
+  void end_waits() {
+    const auto over =
+        std::partition(away_.begin(), away_.end(), [this](const Away &away) { return away.until > now_; });
+    std::sort(over, away_.end(), [this](const Away &a, const Away &b) { return comes_first(a.job, b.job); });
+    for (auto away = over; away != away_.end(); ++away) scheduler_.wake(away->job, now_);
+    away_.erase(over, away_.end());
   }
 
   void release_jobs() {
@@ -204,13 +263,14 @@ class Simulation {
       if (processor.job != job) continue;
       Progress &progress = progress_[job.value];
       progress.executed += now_ - processor.since;
-      progress.left = processor.finish - now_;
+      progress.left = std::min(processor.finish, processor.wait) - now_;
       processor = Processor{};
     }
   }
 
   void give_processor(const sched::Dispatch &dispatch) {
     if (dispatch.kind == sched::DispatchKind::Level) return;  // other dispatches tell which jobs run
+    if (dispatch.kind == sched::DispatchKind::Serve) return go_away(dispatch.job);
     Processor &processor = processors_[dispatch.worker.value];
     REDAG_CHECK(!processor.job.valid(), "the scheduler gave a processor to two jobs");
     if (dispatch.job.value >= progress_.size()) progress_.resize(dispatch.job.value + 1);
@@ -221,10 +281,12 @@ class Simulation {
     } else {
       progress = begin_job(dispatch);
     }
-    processor = Processor{dispatch.job, now_, now_ + progress.left, kNever};
+    processor.job = dispatch.job;
+    processor.since = now_;
+    (progress.ends_in_wait ? processor.wait : processor.finish) = now_ + progress.left;
   }
 
-  [[nodiscard]] TaskState task_state(const Task &task, std::uint32_t place) const {
+  [[nodiscard]] TaskState task_state(const Task &task, TaskId id, std::uint32_t place) const {
     TaskState state;
     state.task = &task;
     state.period = task.period;
@@ -235,13 +297,28 @@ class Simulation {
     if (task.wcet_low > 0) state.fresh.wcet_low = task.wcet_low;
     state.fresh.lead = options_.overheads.release + options_.overheads.dispatch;
     state.fresh.region = task.region;
+    state.fresh.task = id;
     set_demand(state.fresh, task, task.wcet);
     return state;
+  }
+
+  // The job executes until its next wait or its end, from this much executed on.
+  static void set_stretch(Progress &progress, const Task &task, Duration from) {
+    const Duration end = progress.cut_off ? task.budget : progress.demand;
+    const std::size_t next = progress.next_wait;
+    const Duration point = next < task.waits.size() ? wait_point(task, next, progress.demand) : kNever;
+    progress.ends_in_wait = point < end;
+    progress.left = std::min(point, end) - from;
   }
 
   static void set_demand(Progress &progress, const Task &task, Duration demand) {
     progress.cut_off = task.on_budget == OnBudget::Abort && task.budget > 0 && demand > task.budget;
     progress.left = (progress.cut_off ? task.budget : demand) + progress.lead;
+    if (task.waits.empty()) return;
+    REDAG_CHECK(demand >= shortest_demand(task), "a job executes before each of its waits and after the last one");
+    progress.demand = demand;
+    set_stretch(progress, task, 0);
+    progress.left += progress.lead;
   }
 
   [[nodiscard]] Progress begin_job(const sched::Dispatch &dispatch) const {
@@ -285,11 +362,13 @@ class Simulation {
   std::vector<Processor> processors_;
   std::vector<Processor *> at_once_;
   std::vector<Progress> progress_;
+  std::vector<Away> away_;
   ReleaseTree releases_;
   Result result_;
   Time now_ = 0;
   bool has_regions_ = false;
   bool has_limits_ = false;
+  bool has_waits_ = false;
 };
 
 }  // namespace

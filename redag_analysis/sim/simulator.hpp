@@ -21,7 +21,7 @@ namespace redag::sim {
 struct Overheads {
   Duration release = 0;   // handling a release: added to the released job's demand
   Duration dispatch = 0;  // starting a job: spent on its worker before the body
-  Duration preempt = 0;   // each resumption after a preemption: spent on the worker before the job continues
+  Duration preempt = 0;   // each resumption after a preemption or a wait: spent on the worker before the job continues
 };
 
 /// A machine's overheads, as far as the simulator has them: it knows no stalls and no late releases.
@@ -33,6 +33,8 @@ struct Options {
   Overheads overheads;
   /// Execution time of a job, before overheads; default: execution_time() of redag/model/demand.hpp.
   std::function<Duration(const Task &, TaskId, std::uint32_t number)> demand;
+  /// Length of a wait; default: wait_time().
+  std::function<Duration(const Task &, TaskId, std::uint32_t number, std::size_t wait)> wait;
   /// Delay of a timer task's release after its nominal time; default: release_jitter().
   std::function<Duration(const Task &, TaskId, std::uint32_t number)> jitter;
   /// Gap added to the period before the next release, for sporadic tasks (>= 0); default: none, strictly periodic.
@@ -50,8 +52,8 @@ struct Result {
 };
 
 /// Simulates `workload` under `scheduler`, which must be fresh and built from the same workload. Order within one
-/// instant: completions in the static order of tasks, limits in the same order, releases by TaskId, preemption points
-/// by worker, then the decisions.
+/// instant: completions in the static order of tasks; then in the same order limits, waits that begin, and waits that
+/// end; then releases by TaskId, preemption points by worker, and the decisions.
 Result simulate(const Workload &workload, sched::Scheduler &scheduler, std::uint32_t workers, const Options &options,
                 const EventSink &sink);
 

@@ -60,6 +60,8 @@ const metrics::SinkSummary *rarest(const metrics::EndToEnd &end_to_end) {
   return found;
 }
 
+bool has_measured_end(JobEventKind kind) { return kind == JobEventKind::Finished || kind == JobEventKind::Aborted; }
+
 // Returns for each task the time its jobs had a worker during the counted time. Jobs that still run at the end are
 // included: without them, long jobs would seem to use too little.
 std::vector<Duration> work_of(const trace::Trace &trace, std::size_t tasks) {
@@ -76,10 +78,11 @@ std::vector<Duration> work_of(const trace::Trace &trace, std::size_t tasks) {
       case JobEventKind::Dispatched:
       case JobEventKind::Resumed: running[job] = event.time; break;
       case JobEventKind::Preempted:
+      case JobEventKind::Waits:
       case JobEventKind::Finished:
       case JobEventKind::Aborted:
         if (const auto at = running.find(job); at != running.end()) {
-          stop(job.first, at->second, event.kind == JobEventKind::Preempted ? event.time : event.value);
+          stop(job.first, at->second, has_measured_end(event.kind) ? event.value : event.time);
           running.erase(at);
         }
         break;

@@ -103,9 +103,11 @@ TEST(Page, HasWordsForEveryNameThatTheProgramWrites) {
   EXPECT_EQ(keys_of(assets::kScript, "REASONS"), names_to(kLastReason));
   EXPECT_EQ(keys_of(assets::kScript, "OUTCOMES"), names_to(JobOutcome::Aborted));
   EXPECT_EQ(keys_of(assets::kScript, "TONES"), names_to(Tone::Plain));
-  EXPECT_EQ(keys_of(assets::kScript, "ENDS"), (std::vector<std::string>{"finished", "aborted", "preempted", "open"}));
+  EXPECT_EQ(keys_of(assets::kScript, "ENDS"),
+            (std::vector<std::string>{"finished", "aborted", "preempted", "open", "waits"}));
   static_assert(static_cast<int>(Slice::End::Finished) == 0 && static_cast<int>(Slice::End::Aborted) == 1 &&
-                static_cast<int>(Slice::End::Preempted) == 2 && static_cast<int>(Slice::End::Open) == 3);
+                static_cast<int>(Slice::End::Preempted) == 2 && static_cast<int>(Slice::End::Open) == 3 &&
+                static_cast<int>(Slice::End::Waits) == 4);
   std::vector<std::string> worlds = names_to(Driver::RosNodes);
   worlds.emplace_back("ros2");  // experiment::World
   EXPECT_EQ(keys_of(assets::kScript, "DRIVERS"), worlds);

@@ -38,6 +38,7 @@ class SliceFolder {
       case JobEventKind::Dispatched:
       case JobEventKind::Started:
       case JobEventKind::Resumed: begin(event); break;
+      case JobEventKind::Waits: end(event, event.time, Slice::End::Waits); break;
       case JobEventKind::Preempted: end(event, event.time, Slice::End::Preempted); break;
       case JobEventKind::Finished: end(event, event.value, Slice::End::Finished); break;
       case JobEventKind::Aborted: end(event, event.time, Slice::End::Aborted); break;

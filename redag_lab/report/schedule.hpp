@@ -16,7 +16,7 @@ namespace redag::report {
 
 /// A job on a worker, without interruption.
 struct Slice {
-  enum class End : std::uint8_t { Finished, Aborted, Preempted, Open };  // Open: the trace ends here
+  enum class End : std::uint8_t { Finished, Aborted, Preempted, Open, Waits };  // Open: the trace ends here
 
   Time begin = 0;
   Time end = 0;

@@ -70,7 +70,7 @@ Result<Workload> configure(const Workload &workload, const Variant &variant) {
     for (Cluster &cluster : clusters) cluster.workers = 1;
     configured.platform.workers = static_cast<std::uint32_t>(std::max<std::size_t>(1, clusters.size()));
   }
-  Diagnostics mistakes = validate(configured);
+  Diagnostics mistakes = validate(configured, {.waits = variant.is_redag()});
   std::erase_if(mistakes, [](const Diagnostic &mistake) { return mistake.severity != Severity::Error; });
   if (mistakes.empty()) return configured;
   for (Diagnostic &mistake : mistakes) mistake.message = variant.name + ": " + mistake.message;

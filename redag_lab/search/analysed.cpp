@@ -40,8 +40,7 @@ std::string culprit_of(const Analysed &analysed, const analysis::Bound &bound, c
 
 // Returns the first reason that a trusted method states for the missing bound.
 std::string why_no_bound(const Analysed &analysed, std::size_t index, bool is_dag) {
-  if (!analysed.task_set.not_analysable.empty() && !analysed.task_set.has_modes)
-    return analysed.task_set.not_analysable;
+  if (analysed.task_set.is_beyond_all()) return analysed.task_set.not_analysable;
   for (const analysis::MethodReport &method : analysed.report.methods) {
     const analysis::Bound *bound = method.bound();
     if (!method.trusted || bound == nullptr) continue;

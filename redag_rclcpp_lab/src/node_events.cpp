@@ -77,7 +77,10 @@ int phase_of(JobEventKind kind) {
     case JobEventKind::Exceeded:
     case JobEventKind::HighMode:
     case JobEventKind::LowMode:
-    case JobEventKind::Executed: break;  // nodes do not record these
+    case JobEventKind::Executed:
+    case JobEventKind::Waits:
+    case JobEventKind::Served:
+    case JobEventKind::Woken: break;  // nodes do not record these
   }
   return 8;
 }

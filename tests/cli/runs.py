@@ -189,6 +189,42 @@ class Simulate(Case):
         self.assertIn("trace check: ok", result.stdout)
 
 
+class Waits(Case):
+    """Jobs that wait for devices: commands that know them, and the others, which refuse them by file and line."""
+
+    FILE = SOURCE / "workloads" / "perception.yaml"
+
+    def test_simulated_explained_and_checked(self):
+        out = self.folder / "out"
+        self.expect(redag("validate", "--strict", self.FILE), 0)
+        result = self.expect(redag("simulate", self.FILE, "--duration", "2s", "--out", out, "--check"), 0)
+        self.assertIn("perception", result.stdout)
+        events = redag("events", out).stdout
+        for kind in ("waits", "served", "woken"):
+            self.assertIn(kind, events)
+        self.expect(redag("check-trace", out), 0)
+        self.assertIn("waited without a worker", self.expect(redag("why", out, "lidar.segment#0"), 0).stdout)
+
+    def test_bounded_on_one_worker(self):
+        one = self.write("one.yaml", self.FILE.read_text().replace("workers: 2", "workers: 1"))
+        self.expect(redag("analyze", one, "--check"), 0)
+        explained = self.expect(redag("analyze", one, "--explain", "camera.detect"), 0)
+        self.assertIn("waits without a worker", explained.stdout)
+        self.assertIn("on one worker only", self.expect(redag("analyze", self.FILE), 0).stdout)
+        # A device that serves in the order of requests lets each less urgent task go first.
+        fifo = self.write("fifo.yaml", one.read_text().replace("queue: priority", "queue: fifo"))
+        self.expect(redag("analyze", fifo, "--check"), 1)
+
+    def test_others_refuse_them(self):
+        where = f"{self.FILE}:{1 + self.FILE.read_text().splitlines().index(self.segments())}:"
+        for arguments in (["run"], ["simulate", "--executor", "mte"], ["compare"], ["tune"], ["assign"], ["sensitivity"]):
+            with self.subTest(arguments=arguments):
+                self.expect(redag(arguments[0], self.FILE, *arguments[1:]), 2, where, "segments, which cannot be handled here")
+
+    def segments(self):
+        return next(line for line in self.FILE.read_text().splitlines() if "segments:" in line)
+
+
 class Streams(Case):
     def test_a_reader_that_leaves(self):
         out = self.folder / "out"

@@ -44,6 +44,7 @@ void workload_target(std::string_view input) {
   load(input, {});
   load(input, {.wcet_optional = true});
   load(input, {.cluster_optional = true});
+  load(input, {.waits = true});
 }
 
 }  // namespace redag::fuzz

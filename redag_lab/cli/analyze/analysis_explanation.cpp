@@ -37,6 +37,7 @@ std::string what(const Term &term) {
     case Term::Kind::Interference: return "interference by";
     case Term::Kind::Jitter: return "release jitter";
     case Term::Kind::Wait: return "waiting for data of other rates";
+    case Term::Kind::Suspended: return "its waits without a worker";
     case Term::Kind::Overhead: return "overhead";
     case Term::Kind::Waiting: return "all waiting together";
   }
@@ -74,6 +75,8 @@ std::string advice(const lab::Analysed &analysed, const Term &term) {
     }
     case Term::Kind::Jitter: return "less release jitter helps most";
     case Term::Kind::Wait: return "a shorter period or response time of its predecessors helps most";
+    case Term::Kind::Suspended:
+      return "shorter waits, or shorter service of less urgent tasks at its devices, help most";
     case Term::Kind::Overhead: return "fewer and longer jobs, or smaller scheduling overheads, help most";
     case Term::Kind::Waiting:
       return "the exploration found its worst case among all schedules; without --explore, the bounds name the causes";
@@ -113,7 +116,7 @@ std::string explain_bound(const lab::Analysed &analysed, const lab::Row &row, co
 // Returns the reason why there is no bound, the methods that gave up or do not apply, and the load.
 std::string explain_absence(const lab::Analysed &analysed, const lab::Row &row) {
   std::string text = fmt::format("reason for the missing bound: {}\n", row.reason);
-  if (!analysed.task_set.not_analysable.empty() && !analysed.task_set.has_modes) return text;
+  if (analysed.task_set.is_beyond_all()) return text;
   text += describe_gave_up(analysed.report);
   const std::string reasons = methods_that_do_not_apply(analysed.report, false);
   if (!reasons.empty()) text += "methods that do not apply:\n" + reasons;

@@ -92,7 +92,7 @@ std::string remark(const lab::Analysed &analysed, const MethodReport &report) {
 }
 
 std::string method_table(const lab::Analysed &analysed, const StreamTraits &terminal) {
-  if (!analysed.task_set.not_analysable.empty() && !analysed.task_set.has_modes) {
+  if (analysed.task_set.is_beyond_all()) {
     return fmt::format("none of the {} methods applies: {}\n", analysed.report.methods.size(),
                        analysed.task_set.not_analysable);
   }
@@ -221,7 +221,7 @@ std::string verdict_in_words(const lab::Analysed &analysed) {
     return fmt::format("not schedulable: the utilization, {:.3f}, exceeds the capacity of {}", needed,
                        plural(workers, "worker"));
   }
-  if (!analysed.task_set.not_analysable.empty() && !analysed.task_set.has_modes) {
+  if (analysed.task_set.is_beyond_all()) {
     return "not shown schedulable: no method applies to this workload: " + analysed.task_set.not_analysable;
   }
   std::size_t late = 0;

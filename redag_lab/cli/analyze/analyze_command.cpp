@@ -213,7 +213,7 @@ int analyze_file(const Options &options, Console &console) {
                   "leave out --chain or --executor");
     return kExitBad;
   }
-  const std::optional<Workload> workload = load_configured(options.analysis.run, console);
+  const std::optional<Workload> workload = load_configured(options.analysis.run, console, {.waits = true});
   if (!workload || !takes_arguments({*lab::parse_variant(options.executor)}, options.analysis.run, console))
     return kExitBad;
   const Result<Parts> analysed = analyse_configured(*workload, options, console);

@@ -73,7 +73,7 @@ int validate_files(const Options &options, Console &console) {
   Json files = Json::array();
   bool all_ok = true;
   for (const std::string &file : options.files) {
-    const Result<LoadedWorkload> loaded = load_input(file, {.wcet_optional = true});
+    const Result<LoadedWorkload> loaded = load_input(file, {.wcet_optional = true, .waits = true});
     const Diagnostics &found = loaded ? loaded->warnings : loaded.error();
     const bool ok = loaded.has_value() && (found.empty() || !options.strict);
     all_ok = all_ok && ok;

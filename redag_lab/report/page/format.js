@@ -78,6 +78,7 @@ const ENDS = {
   aborted: 'aborted here',
   preempted: 'preempted here',
   open: 'continues',
+  waits: 'waits from here',
 };
 const TONES = {
   good: '\u2713',

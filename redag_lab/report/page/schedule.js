@@ -3,7 +3,7 @@
 
 // Draws the schedule: which job ran where and when. Rows are tasks (with releases, deadlines and misses) or workers.
 
-const [OPEN, PREEMPTED] = [valueOf(ENDS, 'open'), valueOf(ENDS, 'preempted')];
+const [OPEN, PREEMPTED, WAITS] = [valueOf(ENDS, 'open'), valueOf(ENDS, 'preempted'), valueOf(ENDS, 'waits')];
 const [FINISHED, SKIPPED] = [valueOf(OUTCOMES, 'finished'), valueOf(OUTCOMES, 'skipped')];
 const ROW_HEIGHT = 30;
 const MOST_ROWS = 64;
@@ -32,7 +32,15 @@ function scheduleFigure(groups, state, explain) {
       row(task, slices.worker[i]), from + slices.begin[i], from + slices.begin[i] + slices.length[i], i]).filter(shown);
     const marks = state.rows === 'workers' ? [] : jobs.task.map((task, i) => [
       rowOf.get(task), from + jobs.release[i], from + jobs.release[i] + jobs.deadline[i], i]).filter(shown);
-    return {group, view, jobs, slices, rows, bars, marks, from, to: seen.end_ns - start, start};
+    // A wait lasts until the job's next slice.
+    const next = new Map();
+    const resumed = new Array(slices.task.length).fill(null);
+    for (let i = slices.task.length - 1; i >= 0; --i) {
+      const job = `${slices.task[i]}/${slices.job[i]}`;
+      if (slices.how[i] === WAITS) resumed[i] = next.has(job) ? next.get(job) : seen.end_ns - start;
+      next.set(job, from + slices.begin[i]);
+    }
+    return {group, view, jobs, slices, rows, bars, marks, resumed, from, to: seen.end_ns - start, start};
   }
 
   // Workers are numbered through all clusters.
@@ -167,6 +175,9 @@ function scheduleFigure(groups, state, explain) {
                 const right = box.x + box.width;
                 children.push({type: 'polygon', shape: {points: [[right + 0.5, box.y], [right - 4, y], [right + 0.5, box.y + height]]}, style: {fill: t.paper}});
               }
+              const wait = inTasks && c.resumed[i] !== null
+                && clip(params, {x: x1, y: y - 1, width: Math.max(1, api.coord([c.resumed[i], api.value(0)])[0] - x1), height: 2});
+              if (wait) children.push({type: 'rect', silent: true, shape: wait, style: {fill: colour, opacity: 0.6}});
               if (!inTasks && box.width > 34) {
                 children.push({type: 'text', silent: true, style: {text: c.group.tasks[c.slices.task[i]].name, x: box.x + 4, y, fontSize: 11,
                   width: box.width - 8, overflow: 'truncate', ellipsis: '', textVerticalAlign: 'middle', fill: t.paper}});
