@@ -108,13 +108,12 @@ class StepBuilder {
 
   /// Tells that a device begins to serve the job.
   void tell_service(const Job &job, JobSlot slot) {
-    Dispatch &told = dispatches_.emplace_back();
-    told.job = slot;
-    told.task = job.task;
-    told.number = job.number;
-    told.release = job.release;
-    told.origin = job.origin;
-    told.kind = DispatchKind::Serve;
+    dispatches_.add(Dispatch{.job = slot,
+                             .task = job.task,
+                             .number = job.number,
+                             .release = job.release,
+                             .origin = job.origin,
+                             .kind = DispatchKind::Serve});
   }
 
   /// Drops the changes of level that the step has for this job.
