@@ -113,6 +113,8 @@ class StepBuilder {
                              .number = job.number,
                              .release = job.release,
                              .origin = job.origin,
+                             .worker = {},
+                             .over = {},
                              .kind = DispatchKind::Serve});
   }
 
