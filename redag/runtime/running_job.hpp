@@ -37,7 +37,7 @@ struct RunningJob {
   RunningJob *const below;
   Atomic<RunningJob *> *const top;  // WorkerThread::top of its thread: points here while the body runs
 
-  // Set by Engine::run() for each job:
+  // Set by Engine::run_next() for each job:
   TaskId task;
   JobSlot slot;
   Time origin = 0;             // see Job

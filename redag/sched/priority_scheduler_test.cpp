@@ -614,6 +614,19 @@ TEST(PriorityScheduler, AJobThatTakesAPlaceIsItsOwnVictim) {
   EXPECT_TRUE(scheduler.dispatch(3).dispatches.empty()) << "d preempts a, and not b";
 }
 
+TEST(PriorityScheduler, WhatIsRemovedTakesNoPlace) {
+  const Workload workload = make_workload({make_dag("chain", {{"a", 10}, {"b", 0, 1, {0}}})}, 1);
+  for (const std::string removed : {"nothing", "a", "b", "chain"}) {
+    PriorityScheduler scheduler(workload, {});
+    scheduler.release(TaskId(0), 0, 0);
+    const JobSlot a = scheduler.dispatch(0).dispatches.front().job;
+    if (removed == "chain") scheduler.remove_dag(DagId(0), 1);
+    if (removed == "a" || removed == "b") scheduler.remove_task(TaskId(removed == "a" ? 0 : 1), 1);
+    EXPECT_TRUE(scheduler.dispatch(1).dispatches.empty());
+    EXPECT_EQ(scheduler.finish(a, 2, Outcome::Finished).dispatches.empty(), removed != "nothing") << removed;
+  }
+}
+
 TEST(PriorityScheduler, RecordsOnlyTheKindsAskedFor) {
   const Workload workload = make_workload({make_dag("a", {{"t", 10}})}, 1);
   PriorityScheduler scheduler(workload, {});
