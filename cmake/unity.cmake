@@ -57,6 +57,7 @@ set(alone
   redag_lab/cli/serve/live_server.cpp
   redag_lab/cli/serve/serve_command.cpp
   redag_lab/cli/terminal/screen.cpp
+  redag_lab/cli/terminal/workload_input.cpp
   redag_lab/cli/top/top_command.cpp
   redag_lab/experiment/factorial_plan.cpp
   redag_lab/experiment/factorial_plan_test.cpp
