@@ -47,6 +47,8 @@ set(alone
   redag_lab/cli/analyze/tune_command.cpp
   redag_lab/cli/analyze/tuning_report.cpp
   redag_lab/cli/experiment/report_command.cpp
+  redag_lab/cli/robot/arrange_command.cpp
+  redag_lab/cli/robot/arrange_report.cpp
   redag_lab/cli/run/calibrate_command.cpp
   redag_lab/cli/run/check_trace_command.cpp
   redag_lab/cli/run/compare_command.cpp
