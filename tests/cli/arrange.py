@@ -174,7 +174,7 @@ dags:
         self.expect(self.arrange("--undo"), 0)
         self.assertEqual([state(tid) for tid in (rx, slow, log, other)], before)
         self.assertFalse(self.state.exists())
-        self.assertIn("0 changes are undone", self.expect(self.arrange("--undo"), 0).stderr)
+        self.assertIn("changes undone: 0", self.expect(self.arrange("--undo"), 0).stderr)
 
     def watch(self):
         process = subprocess.Popen([PROGRAM, "arrange", self.robot, "--state", self.state, "--watch", "--interval", "20ms"],

@@ -137,7 +137,7 @@ int undo(robot::Arrangement &arrangement, Console &console) {
     return kExitBad;
   }
   for (const std::string &remark : undone->remarks) console.note("note: " + remark + "\n");
-  console.note(fmt::format("{} changes are undone\n", undone->restored));
+  console.note(fmt::format("changes undone: {}\n", undone->restored));
   return kExitOk;
 }
 
@@ -154,8 +154,12 @@ int apply_once(const robot::Changes &changes, robot::Arrangement &arrangement, C
     console.error("interrupted: nothing is changed");
     return kExitNo;
   }
-  console.note(fmt::format("{} changes are applied; 'redag arrange --undo' takes them back\n",
-                           changes.threads.size() + changes.interrupts.size()));
+  if (changes.is_empty()) {
+    console.note("there is nothing to change\n");
+  } else {
+    console.note(fmt::format("changes applied: {}; 'redag arrange --undo' takes them back\n",
+                             changes.threads.size() + changes.interrupts.size()));
+  }
   return kExitOk;
 }
 
