@@ -23,7 +23,6 @@
 #include <vector>
 
 #include "redag/live/process.hpp"
-#include "redag/runtime/threads.hpp"
 
 namespace redag::robot {
 namespace {
@@ -79,8 +78,10 @@ class Waiting {
 class ArrangementTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (runtime::available_fifo_priority(kRaised) < kRaised) {
-      GTEST_SKIP() << "this process may not use SCHED_FIFO: " << runtime::realtime_hint();
+    const Waiting probe;
+    const ThreadChange change = raise(probe);
+    if (const Result<void> raised = system_.set(change.thread, "probe", change.after); !raised) {
+      GTEST_SKIP() << to_string(raised.error());
     }
     folder_ = fs::temp_directory_path() / fmt::format("redag-arrangement-{}", getpid());
     fs::create_directory(folder_);
@@ -249,6 +250,7 @@ TEST_F(ArrangementTest, ThreadsOfRaisedOnesBeginAsOrdinaryOnes) {
   });
   Changes changes;
   changes.threads = {raise(a)};
+  changes.threads[0].after.cpus = changes.threads[0].before.cpus;  // where its child runs as well
   Arrangement arrangement = open();
   ASSERT_TRUE(arrangement.apply(changes, never_stops));
   a.end();
