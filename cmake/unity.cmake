@@ -47,6 +47,8 @@ set(alone
   redag_lab/cli/analyze/tune_command.cpp
   redag_lab/cli/analyze/tuning_report.cpp
   redag_lab/cli/experiment/report_command.cpp
+  redag_lab/cli/robot/arrange_command.cpp
+  redag_lab/cli/robot/arrange_report.cpp
   redag_lab/cli/run/calibrate_command.cpp
   redag_lab/cli/run/check_trace_command.cpp
   redag_lab/cli/run/compare_command.cpp
@@ -57,6 +59,7 @@ set(alone
   redag_lab/cli/serve/live_server.cpp
   redag_lab/cli/serve/serve_command.cpp
   redag_lab/cli/terminal/screen.cpp
+  redag_lab/cli/terminal/workload_input.cpp
   redag_lab/cli/top/top_command.cpp
   redag_lab/experiment/factorial_plan.cpp
   redag_lab/experiment/factorial_plan_test.cpp

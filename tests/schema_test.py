@@ -2,7 +2,7 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Checks that every workload file satisfies docs/workload.schema.json, and that the schema refuses bad files.
+"""Checks that every workload and robot satisfies its schema in docs/, and that the schemas refuse bad files.
 
 Needs python3-jsonschema and python3-yaml. Run: python3 tests/schema_test.py
 """
@@ -17,6 +17,20 @@ import yaml
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 SCHEMA = json.loads((ROOT / "docs" / "workload.schema.json").read_text(encoding="utf-8"))
+ROBOT_SCHEMA = json.loads((ROOT / "docs" / "robot.schema.json").read_text(encoding="utf-8"))
+ROBOT = """
+robot: cart
+cpu_sets: [{name: fast, cpus: 0-1}]
+processes:
+  - {name: base, match: {name: base_node}, cpus: fast, workload: base.yaml}
+  - name: arm
+    match: {command: "*/arm *", cgroup: "/robot*"}
+    workload: {dags: [{name: d, tasks: [{name: t, wcet: 1ms, period: 5ms}]}]}
+threads:
+  - {name: t, match: {process: arm, thread: rx}, level: {task: arm.d.t}}
+irqs:
+  - {name: i, match: "eth*", cpus: fast}
+"""
 TASK = {"name": "t", "wcet": "1ms", "period": "10ms"}
 CALLBACKS = (
     {"timer": "2ms"},
@@ -53,6 +67,13 @@ BAD_CALLBACKS = (
 
 def errors(document):
     return [error.message for error in jsonschema.Draft7Validator(SCHEMA).iter_errors(document)]
+
+
+def robot_errors(document):
+    place = (ROOT / "docs").as_uri()
+    resolver = jsonschema.RefResolver(f"{place}/robot.schema.json", ROBOT_SCHEMA,
+                                      store={f"{place}/workload.schema.json": SCHEMA})
+    return [error.message for error in jsonschema.Draft7Validator(ROBOT_SCHEMA, resolver=resolver).iter_errors(document)]
 
 
 def with_task(**changes):
@@ -195,6 +216,29 @@ class SchemaTest(unittest.TestCase):
         self.assertEqual(errors(document), [])
         del document["dags"][0]["tasks"][0]["callback"]
         self.assertNotEqual(errors(document), [])
+
+    def test_robots(self):
+        jsonschema.Draft7Validator.check_schema(ROBOT_SCHEMA)
+        files = [ROOT / "examples" / "robot" / "cart.yaml"]
+        texts = [file.read_text(encoding="utf-8") for file in files]
+        page = (ROOT / "docs" / "robot.md").read_text(encoding="utf-8")
+        texts += [part.split("```")[0] for part in page.split("```yaml")[1:]]
+        self.assertGreater(len(texts), 1)
+        for text in [*texts, ROBOT]:
+            self.assertEqual(robot_errors(yaml.safe_load(text)), [], text)
+
+    def test_refuses_bad_robots(self):
+        for level in ("above", "below", {"rate": "5ms"}, {"fifo": 80}, {"nice": -20}):
+            document = yaml.safe_load(ROBOT)
+            document["threads"][0]["level"] = level
+            self.assertEqual(robot_errors(document), [], level)
+        for key, value in (("cpus", "0"), ("processes", []), ("policy", "edf"), ("robots", 1)):
+            self.assertTrue(robot_errors({**yaml.safe_load(ROBOT), key: value}), key)
+        for key, value in (("level", "top"), ("level", {"fifo": 100}), ("level", {"rate": "5ms", "fifo": 1}),
+                           ("match", {}), ("count", 0), ("wcet", "0ms")):
+            document = yaml.safe_load(ROBOT)
+            document["threads"][0][key] = value
+            self.assertTrue(robot_errors(document), (key, value))
 
     def test_refuses_incomplete_documents(self):
         self.assertNotEqual(errors({}), [])

@@ -18,6 +18,7 @@
 
 #include "redag/model/text_file.hpp"
 #include "redag/model/validate.hpp"
+#include "redag/model/workload_yaml_node.hpp"
 #include "redag/model/workload_yaml_tree.hpp"
 #include "redag/model/workload_yaml_values.hpp"
 
@@ -522,17 +523,23 @@ Result<LoadedWorkload> parse_workload(std::string_view text, std::string file_na
   }
   const Result<Node> root = yaml::parse(text, file_name);
   if (!root) return tl::unexpected<Diagnostics>(root.error());
-  return Reader(*root, std::move(file_name), options).run();
+  return read_workload(*root, std::move(file_name), options);
+}
+
+Result<LoadedWorkload> read_workload(const Node &root, std::string file_name, LoadOptions options) {
+  return Reader(root, std::move(file_name), options).run();
 }
 
 Result<LoadedWorkload> load_workload(const std::filesystem::path &path, LoadOptions options) {
   const Result<std::string> text = read_text_file(path, "a workload file", kMaxWorkloadBytes);
   if (!text) return tl::unexpected<Diagnostics>(text.error());
   Result<LoadedWorkload> loaded = parse_workload(*text, path.string(), options);
-  if (loaded && loaded->workload.name.empty() && name_mistake(path.stem().string()).empty()) {
-    loaded->workload.name = path.stem().string();
-  }
+  if (loaded) name_after(path, loaded->workload);
   return loaded;
+}
+
+void name_after(const std::filesystem::path &path, Workload &workload) {
+  if (workload.name.empty() && name_mistake(path.stem().string()).empty()) workload.name = path.stem().string();
 }
 
 }  // namespace redag

@@ -4,10 +4,13 @@
 #include "redag/runtime/setup.hpp"
 
 #include <fmt/format.h>
-#include <sched.h>
 
 #include <algorithm>
+#include <charconv>
+#include <cstdlib>
+#include <utility>
 
+#include "redag/base/text.hpp"
 #include "redag/runtime/threads.hpp"
 
 namespace redag::runtime {
@@ -15,16 +18,43 @@ namespace {
 
 // From the top: 9 priorities for the kernel's own threads (migration, watchdog, raised interrupt threads), then one for
 // the release timer. Below it is room for the user's own urgent threads above the jobs.
-constexpr int kKernelRoom = 9;
 constexpr int kUserRoom = 9;
 constexpr std::uint32_t kSpareThreads = 16;
 
 }  // namespace
 
-PriorityBand probe_priority_band() {
-  const int timer = available_fifo_priority(sched_get_priority_max(SCHED_FIFO) - kKernelRoom);
+PriorityBand band_up_to(int limit) {
+  const int timer = std::min(limit, kHighestPriority);
   if (timer < 2) return {};  // needs at least one for the timer and one for jobs
   return PriorityBand{timer > 4 * kUserRoom ? timer - kUserRoom - 1 : timer - 1, timer};
+}
+
+PriorityBand probe_priority_band() { return band_up_to(available_fifo_priority(kHighestPriority)); }
+
+Result<PriorityBand> with_levels(PriorityBand band, const std::string &text) {
+  band.given.clear();
+  const char *at = text.data();
+  const char *const end = at + text.size();
+  while (at != end) {
+    int priority = 0;
+    const auto [next, error] = std::from_chars(at, end, priority);
+    const bool descends = priority >= 2 && (band.given.empty() || priority <= band.given.back());
+    if (error != std::errc() || !descends || (next != end && (*next != ',' || next + 1 == end))) {
+      return make_error(fmt::format("{} is {}, which is no list of priorities from the highest to 2 at least",
+                                    kLevelsVariable, in_quotes(text)),
+                        "take it from 'redag arrange ROBOT --levels PROCESS', such as 80,78,77");
+    }
+    band.given.push_back(priority);
+    at = next == end ? end : next + 1;
+  }
+  if (band.given.empty() || band.top_job == 0) return band;
+  if (band.given.front() >= band.timer) {
+    return make_error(fmt::format("{} asks for priority {}, and this process can have at most {} for jobs",
+                                  kLevelsVariable, band.given.front(), band.timer - 1),
+                      "raise its limit (rtprio), or plan with 'redag arrange --rtprio'");
+  }
+  band.top_job = band.given.front();
+  return band;
 }
 
 Result<Mode> resolve_mode(PreemptionMode wanted, PolicyKind policy, const PriorityBand &band) {
@@ -71,6 +101,12 @@ Result<Setup> set_up(const SetupRequest &request) {
   Result<Mode> mode = resolve_mode(request.preemption, request.policy, setup.band);
   if (!mode) return tl::unexpected(mode.error());
   setup.mode = *std::move(mode);
+  const char *const levels = std::getenv(kLevelsVariable);
+  if (levels != nullptr && setup.mode.mode == PreemptionMode::Os) {
+    Result<PriorityBand> band = with_levels(setup.band, levels);
+    if (!band) return tl::unexpected(band.error());
+    setup.band = *std::move(band);
+  }
   const std::size_t processors = request.cpus.empty() ? usable_cpus().size() : request.cpus.size();
   const std::uint32_t workers = request.workers == 0 ? static_cast<std::uint32_t>(processors) : request.workers;
   const std::uint32_t threads = std::max(request.threads == 0 ? workers + kSpareThreads : request.threads, workers);
@@ -78,6 +114,10 @@ Result<Setup> set_up(const SetupRequest &request) {
   setup.config.ties = request.ties;
   if (setup.mode.mode == PreemptionMode::Os) setup.throttling = realtime_throttling();
   setup.warnings = mode_warnings(workers, processors, setup.throttling);
+  if (levels != nullptr && setup.mode.mode != PreemptionMode::Os) {
+    setup.warnings.push_back(fmt::format("{} has no effect, because the preemption is {} and not os", kLevelsVariable,
+                                         to_string(setup.mode.mode)));
+  }
   return setup;
 }
 

@@ -23,14 +23,36 @@ namespace redag::runtime {
 struct PriorityBand {
   int top_job = 0;  // 0: the process has no real-time rights
   int timer = 0;
+  // By level, from REDAG_LEVELS: priorities in an order of several processes. Empty: all of them, one for each level.
+  std::vector<int> given = {};
 
   /// Number of levels for jobs that are not demoted.
-  [[nodiscard]] std::uint32_t levels() const { return static_cast<std::uint32_t>(std::max(1, top_job - 1)); }
-  [[nodiscard]] int of_level(std::uint32_t level) const { return std::max(1, top_job - static_cast<int>(level)); }
+  [[nodiscard]] std::uint32_t levels() const {
+    return given.empty() ? static_cast<std::uint32_t>(std::max(1, top_job - 1))
+                         : static_cast<std::uint32_t>(given.size());
+  }
+  [[nodiscard]] int of_level(std::uint32_t level) const {
+    if (given.empty()) return std::max(1, top_job - static_cast<int>(level));
+    return level < given.size() ? given[level] : 1;
+  }
 };
+
+/// The highest priority that an executor uses. Those above are left to the kernel's own threads.
+inline constexpr int kHighestPriority = 90;
+
+/// The band of a process that may use SCHED_FIFO up to this priority.
+[[nodiscard]] PriorityBand band_up_to(int limit);
 
 /// Finds the priorities that the process may use, by trying them.
 [[nodiscard]] PriorityBand probe_priority_band();
+
+/// The variable of the environment with the priorities of an executor's levels, most urgent first ("80,78,77"). `redag
+/// arrange` computes them for executors that share a machine (docs/robot.md).
+inline constexpr const char *kLevelsVariable = "REDAG_LEVELS";
+
+/// Returns `band` with the priorities that `text` gives to its levels. Error: `text` is no list of descending
+/// priorities from 2, or they are not below the timer of the band.
+[[nodiscard]] Result<PriorityBand> with_levels(PriorityBand band, const std::string &text);
 
 /// `auto` becomes `os` where `band` and the policy allow it, else `cooperative`. Error: `os` was asked for and is not
 /// available.

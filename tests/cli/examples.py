@@ -57,7 +57,8 @@ def names_in(text):
 class Examples(Case):
     def setUp(self):
         super().setUp()
-        (self.folder / "workloads").symlink_to(SOURCE / "workloads")
+        for shipped in ("workloads", "examples"):
+            (self.folder / shipped).symlink_to(SOURCE / shipped)
         for plan in (SOURCE / "experiments").rglob("*.yaml"):
             text = plan.read_text()
             for pattern, less in FEWER.items():

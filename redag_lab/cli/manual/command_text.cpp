@@ -15,7 +15,7 @@ Completion completion_of(const CLI::Option &option, const ValueType &type) {
   if (option.get_type_size() == 0) return Completion::Nothing;
   if (!type.choices.empty()) return type.name == "LIST" ? Completion::Names : Completion::Name;
   if (type.name == "FILE" || type.name == "PROGRAM") return Completion::File;
-  if (type.name == "WORKLOAD" || type.name == "PLAN") return Completion::Yaml;
+  if (type.name == "WORKLOAD" || type.name == "ROBOT" || type.name == "PLAN") return Completion::Yaml;
   if (type.name == "RESULT") return Completion::Result;
   if (type.name == "DIR") return Completion::Folder;
   return Completion::Text;

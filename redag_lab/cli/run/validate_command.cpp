@@ -10,8 +10,8 @@
 #include "redag_analysis/sim/simulator.hpp"
 #include "redag_analysis/text/tint.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
-#include "redag_lab/cli/terminal/files.hpp"
 #include "redag_lab/cli/terminal/json.hpp"
+#include "redag_lab/cli/terminal/workload_input.hpp"
 
 namespace redag::cli {
 namespace {
@@ -46,8 +46,8 @@ Facts facts_of(const Workload &workload) {
   return facts;
 }
 
-std::string plural(std::size_t count, const char *noun) {
-  return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s");
+std::string plural(std::size_t count, const char *stem, const char *many = "s", const char *one = "") {
+  return fmt::format("{} {}{}", count, stem, count == 1 ? one : many);
 }
 
 std::string describe(const Facts &facts) {
@@ -69,24 +69,57 @@ Json facts_json(const std::string &name, const Facts &facts) {
               {"hyperperiod_ns", facts.hyperperiod ? Json(*facts.hyperperiod) : Json()}};
 }
 
+// What a robot file has besides the workload that it makes.
+std::string describe(const robot::Robot &robot) {
+  std::size_t cpus = 0;
+  for (const robot::CpuSet &set : robot.cpu_sets) cpus += set.cpus.size();
+  return fmt::format("robot of {} on {}, {} of threads, {} of irqs", plural(robot.processes.size(), "process", "es"),
+                     plural(cpus, "processor"), plural(robot.threads.size(), "entr", "ies", "y"),
+                     plural(robot.interrupts.size(), "entr", "ies", "y"));
+}
+
+// A sound robot may have no workload that says what it does: `redag arrange` takes it all the same.
+Diagnostics as_warnings(Diagnostics found) {
+  for (Diagnostic &each : found) each.severity = Severity::Warning;
+  return found;
+}
+
+Diagnostics findings_of(const Result<robot::Input> &input) {
+  if (!input) return input.error();
+  Diagnostics found = input->warnings;
+  const Diagnostics more = input->workload ? input->workload->warnings : as_warnings(input->workload.error());
+  found.insert(found.end(), more.begin(), more.end());
+  return found;
+}
+
+std::string describe(const robot::Input &input) {
+  std::string text = input.robot ? describe(*input.robot) : "";
+  if (!input.workload) return text + ", not to be analysed as one workload";
+  return text + (text.empty() ? "" : ": ") + describe(facts_of(input.workload->workload));
+}
+
 int validate_files(const Options &options, Console &console) {
   Json files = Json::array();
   bool all_ok = true;
   for (const std::string &file : options.files) {
-    const Result<LoadedWorkload> loaded = load_input(file, {.wcet_optional = true, .waits = true});
-    const Diagnostics &found = loaded ? loaded->warnings : loaded.error();
-    const bool ok = loaded.has_value() && (found.empty() || !options.strict);
+    const Result<robot::Input> input = load_workload_or_robot(file, {.wcet_optional = true, .waits = true});
+    const Diagnostics found = findings_of(input);
+    const bool ok = input.has_value() && (found.empty() || !options.strict);
     all_ok = all_ok && ok;
     if (options.json) {
       files.push_back(Json{{"file", file}, {"ok", ok}, {"diagnostics", diagnostics_json(found)}});
-      if (loaded) files.back()["workload"] = facts_json(loaded->workload.name, facts_of(loaded->workload));
+      if (input && input->robot) files.back()["robot"] = input->robot->name;
+      if (input && input->workload) {
+        const Workload &workload = input->workload->workload;
+        files.back()["workload"] = facts_json(workload.name, facts_of(workload));
+      }
       continue;
     }
     console.note(found);
     if (ok) {
       const std::string verdict = tinted("ok", Tint::Good, console.out_traits().colour);
-      console.say(fmt::format("{}: {}: {}\n", file, verdict, describe(facts_of(loaded->workload))));
-    } else if (loaded) {
+      console.say(fmt::format("{}: {}: {}\n", file, verdict, describe(*input)));
+    } else if (input) {
       console.error(fmt::format("{}: {} not accepted by --strict", file, plural(found.size(), "warning")));
     }
   }
@@ -98,7 +131,7 @@ int validate_files(const Options &options, Console &console) {
 
 Action add_validate(CLI::App &app) {
   auto options = std::make_shared<Options>();
-  app.add_option("FILE", options->files, "Workload files (YAML); - reads standard input")
+  app.add_option("FILE", options->files, "Files of workloads or robots (YAML); - reads standard input")
       ->type_name("WORKLOAD")
       ->required();
   app.add_flag("--strict", options->strict, "Treat warnings as errors");

@@ -18,27 +18,13 @@
 #include "redag/base/text.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/output_file.hpp"
+#include "redag_lab/cli/terminal/workload_input.hpp"
 #include "redag_lab/run/variant.hpp"
 
 namespace redag::cli {
 namespace {
 
 namespace fs = std::filesystem;
-
-Result<std::string> read_standard_input() {
-  std::string text;
-  std::string block(std::size_t{1} << 16U, '\0');
-  while (text.size() <= kMaxWorkloadBytes) {
-    const ssize_t count = ::read(STDIN_FILENO, block.data(), block.size());
-    if (count == 0) return text;
-    if (count > 0) {
-      text.append(block, 0, static_cast<std::size_t>(count));
-    } else if (errno != EINTR) {
-      return trace::file_error("<stdin>", 0, fmt::format("cannot read: {}", std::strerror(errno)));
-    }
-  }
-  return trace::file_error("<stdin>", 0, fmt::format("the file is longer than {} bytes", kMaxWorkloadBytes));
-}
 
 // Writes to devices and pipes, which a rename cannot replace.
 Result<void> write_in_place(const std::string &path, std::string_view text) {
@@ -60,12 +46,9 @@ bool is_number(std::string_view text) {
 }  // namespace
 
 Result<LoadedWorkload> load_input(const std::string &path, LoadOptions options) {
-  if (path != "-") return load_workload(path, options);
-  Result<std::string> text = read_standard_input();
-  if (!text) return tl::unexpected<Diagnostics>(std::move(text.error()));
-  Result<LoadedWorkload> loaded = parse_workload(*text, "<stdin>", options);
-  if (loaded && loaded->workload.name.empty()) loaded->workload.name = "stdin";
-  return loaded;
+  Result<robot::Input> input = load_workload_or_robot(path, options);
+  if (!input) return tl::unexpected<Diagnostics>(std::move(input.error()));
+  return robot::as_workload(*std::move(input));
 }
 
 Result<void> write_text(const std::string &path, std::string_view text) {

@@ -14,7 +14,7 @@
 
 namespace redag::cli {
 
-/// Calls load_workload(), or parses standard input if `path` is "-".
+/// Reads a workload, or a robot as one workload, from a file, or from standard input if `path` is "-".
 [[nodiscard]] Result<LoadedWorkload> load_input(const std::string &path, LoadOptions options = {});
 
 /// Writes a whole file or nothing (trace::OutputFile). Devices and pipes are written directly.

@@ -31,7 +31,8 @@ struct Entry {
 constexpr std::array kCommands = {
     Entry{"validate", "Check workload files and report every mistake with its line", add_validate,
           "  redag validate workloads/robot.yaml\n"
-          "  redag validate --strict workloads/*.yaml\n"},
+          "  redag validate --strict workloads/*.yaml\n"
+          "  redag validate examples/robot/cart.yaml\n"},
     Entry{"generate", "Generate random workloads from a seed", add_generate,
           "  redag generate --dags 4 --utilization 1.6 --seed 7 -o random.yaml\n"
           "  redag generate --periods robot --shape chain | redag validate -\n"
@@ -77,6 +78,11 @@ constexpr std::array kCommands = {
           "  redag tune workloads/robot.yaml\n"
           "  redag tune workloads/robot.yaml --objective max_lateness -o tuned.yaml\n"
           "  redag tune workloads/robot.yaml --vary max_active --caps 2-5 --all-trials\n"},
+    Entry{"arrange", "Put the processes of a robot, and other threads, into one order", add_arrange,
+          "  redag arrange examples/robot/cart.yaml\n"
+          "  redag arrange examples/robot/cart.yaml --levels drive\n"
+          "  sudo redag arrange examples/robot/cart.yaml --apply\n"
+          "  sudo redag arrange examples/robot/cart.yaml --undo\n"},
     Entry{"experiment", "Run experiments over many workloads: seeded, parallel, resumable", add_experiment,
           "  redag experiment acceptance experiments/acceptance_tasks.yaml\n"
           "  redag experiment acceptance --help\n"

@@ -1,0 +1,44 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+#include "redag_lab/cli/terminal/workload_input.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+#include "redag/trace/output_file.hpp"
+
+namespace redag::cli {
+namespace {
+
+Result<std::string> read_standard_input() {
+  std::string text;
+  std::string block(std::size_t{1} << 16U, '\0');
+  while (text.size() <= kMaxWorkloadBytes) {
+    const ssize_t count = ::read(STDIN_FILENO, block.data(), block.size());
+    if (count == 0) return text;
+    if (count > 0) {
+      text.append(block, 0, static_cast<std::size_t>(count));
+    } else if (errno != EINTR) {
+      return trace::file_error("<stdin>", 0, fmt::format("cannot read: {}", std::strerror(errno)));
+    }
+  }
+  return trace::file_error("<stdin>", 0, fmt::format("the file is longer than {} bytes", kMaxWorkloadBytes));
+}
+
+}  // namespace
+
+Result<robot::Input> load_workload_or_robot(const std::string &path, LoadOptions options) {
+  if (path != "-") return robot::load_input(path, options);
+  Result<std::string> text = read_standard_input();
+  if (!text) return tl::unexpected<Diagnostics>(std::move(text.error()));
+  Result<robot::Input> input = robot::parse_input(*text, "<stdin>", options);
+  if (input && input->workload && input->workload->workload.name.empty()) input->workload->workload.name = "stdin";
+  return input;
+}
+
+}  // namespace redag::cli

@@ -1,0 +1,16 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// Reads the input of a command that takes a workload or a robot. Not thread-safe.
+#pragma once
+
+#include <string>
+
+#include "redag_lab/robot/input.hpp"
+
+namespace redag::cli {
+
+/// Reads a file, or standard input if `path` is "-".
+[[nodiscard]] Result<robot::Input> load_workload_or_robot(const std::string &path, LoadOptions options = {});
+
+}  // namespace redag::cli

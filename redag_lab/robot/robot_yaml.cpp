@@ -1,0 +1,451 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+#include "redag_lab/robot/robot_yaml.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <iterator>
+#include <span>
+#include <tuple>
+#include <unordered_map>
+#include <unordered_set>
+#include <utility>
+
+#include "redag/base/cpu_list.hpp"
+#include "redag/base/text.hpp"
+#include "redag/model/validate.hpp"
+#include "redag/model/workload_yaml_node.hpp"
+#include "redag/model/workload_yaml_values.hpp"
+
+namespace redag::robot {
+namespace {
+
+using yaml::find;
+using yaml::Node;
+
+constexpr std::array kPolicies = {PolicyKind::RateMonotonic, PolicyKind::DeadlineMonotonic, PolicyKind::Fixed};
+constexpr int kMostFifo = 99;
+constexpr int kLeastNice = -20;
+constexpr int kMostNice = 19;
+constexpr std::uint32_t kMostThreads = 256;
+
+class RobotReader : private yaml::ValueReader {
+ public:
+  RobotReader(const Node &root, const std::string &file, LoadOptions options)
+      : ValueReader(file), root_(root), options_(options) {}
+
+  Result<LoadedRobot> run() {
+    if (check_map(root_, "a robot", {"robot", "policy", "cpus", "cpu_sets", "processes", "threads", "irqs"})) {
+      take(root_, "robot", robot_.name, [this](const Node &node, auto key) { return text(node, key); });
+      take(root_, "policy", robot_.policy,
+           [this](const Node &node, auto key) { return one_of(node, key, std::span<const PolicyKind>(kPolicies)); });
+      read_cpu_sets();
+      read_list("processes", names_of_processes_, [this](const Node &node) { read_process(node); });
+      read_list("threads", names_of_threads_, [this](const Node &node) { read_threads(node); });
+      read_list("irqs", names_of_interrupts_, [this](const Node &node) { read_interrupts(node); });
+      if (robot_.processes.empty() && !is_broken_) {
+        error(root_, "the robot has no processes", "add one under 'processes:'");
+      }
+    }
+    Diagnostics found = take_diagnostics();
+    // Those of other files keep the order of these files.
+    std::move(of_other_files_.begin(), of_other_files_.end(), std::back_inserter(found));
+    if (has_errors(found)) return tl::unexpected<Diagnostics>(std::move(found));
+    return LoadedRobot{std::move(robot_), std::move(found)};
+  }
+
+ private:
+  using Names = std::unordered_map<std::string, std::size_t>;
+
+  template <class T, class Read>
+  bool take(const Node &map, std::string_view key, T &out, Read read) {
+    const Node *node = find(map, key);
+    if (node == nullptr) return false;
+    auto value = read(*node, key);
+    if (value) out = std::move(*value);
+    return value.has_value();
+  }
+  bool take_text(const Node &map, std::string_view key, std::string &out) {
+    return take(map, key, out, [this](const Node &node, auto name) { return text(node, name); });
+  }
+
+  [[nodiscard]] Place place_of(const Node &node) const { return {file_, node.line, node.column}; }
+
+  // Calls `read` for each item of a list, which may be absent.
+  template <class Read>
+  void read_list(std::string_view key, Names &names, Read read) {
+    const Node *node = find(root_, key);
+    if (node == nullptr || node->kind == Node::Kind::Null) return;
+    if (node->kind != Node::Kind::Sequence) {
+      wrong_type(*node, key, "a list");
+      is_broken_ = true;
+      return;
+    }
+    if (node->children.size() > kMaxEntries) {
+      error(*node, fmt::format("{} has {} entries; at most {} are allowed", key, node->children.size(), kMaxEntries));
+      is_broken_ = true;
+      return;
+    }
+    names.reserve(node->children.size());
+    for (const Node &item : node->children) read(item);
+  }
+
+  // Reads the name of an entry, and refuses one that another entry has.
+  bool take_name(const Node &node, std::string_view what, Names &names, std::size_t position, std::string &out) {
+    const Node *name = find(node, "name");
+    if (name == nullptr) {
+      error(node, fmt::format("{} has no name", what), "add 'name:'");
+      return false;
+    }
+    if (!take_text(node, "name", out)) return false;
+    if (names.emplace(out, position).second) return true;
+    error(*name, fmt::format("the name '{}' is used by another entry of this list", out), "choose a unique name");
+    return false;
+  }
+
+  void read_cpu_sets() {
+    const Node *cpus_node = find(root_, "cpus");
+    const Node *sets = find(root_, "cpu_sets");
+    if ((cpus_node == nullptr) == (sets == nullptr)) {
+      error(cpus_node == nullptr ? root_ : *cpus_node,
+            cpus_node == nullptr ? "the robot names no processors" : "the robot has both 'cpus' and 'cpu_sets'",
+            "add 'cpus: 0-3' if all processes share them, or else 'cpu_sets:'");
+      is_broken_ = true;
+      return;
+    }
+    if (cpus_node != nullptr) {
+      CpuSet set;
+      is_broken_ = !take(root_, "cpus", set.cpus, [this](const Node &node, auto key) { return cpus(node, key); });
+      robot_.cpu_sets.push_back(std::move(set));
+      return;
+    }
+    read_list("cpu_sets", names_of_sets_, [this](const Node &node) { read_cpu_set(node); });
+    if (robot_.cpu_sets.empty() && !is_broken_) {
+      error(*sets, "cpu_sets is an empty list", "add a set such as {name: all, cpus: 0-3}");
+    }
+    is_broken_ = is_broken_ || robot_.cpu_sets.empty();
+  }
+
+  void read_cpu_set(const Node &node) {
+    CpuSet set;
+    bool is_sound = check_map(node, "a CPU set", {"name", "cpus"}) &&
+                    take_name(node, "a CPU set", names_of_sets_, robot_.cpu_sets.size(), set.name);
+    if (is_sound && parse_cpu_list(set.name)) {
+      error(*find(node, "name"), fmt::format("the name '{}' of a CPU set is also a list of processors", set.name),
+            "choose a name such as 'control'");
+      is_sound = false;
+    }
+    if (is_sound && find(node, "cpus") == nullptr) {
+      error(node, fmt::format("CPU set '{}' has no processors", set.name), "add 'cpus:'");
+      is_sound = false;
+    }
+    is_sound =
+        is_sound && take(node, "cpus", set.cpus, [this](const Node &value, auto key) { return cpus(value, key); });
+    for (const int cpu : set.cpus) {
+      if (owned_.insert(cpu).second) continue;
+      error(*find(node, "cpus"), fmt::format("processor {} of CPU set '{}' is also one of another set", cpu, set.name),
+            "CPU sets share no processors");
+      is_sound = false;
+      break;
+    }
+    is_broken_ = is_broken_ || !is_sound;
+    robot_.cpu_sets.push_back(std::move(set));
+  }
+
+  void read_process(const Node &node) {
+    Process process;
+    process.place = place_of(node);
+    const bool is_sound = check_map(node, "a process", {"name", "match", "cpus", "workload"}) &&
+                          take_name(node, "a process", names_of_processes_, robot_.processes.size(), process.name);
+    is_broken_ = is_broken_ || !is_sound;
+    if (is_sound) {
+      if (find(node, "match") == nullptr) {
+        error(node, fmt::format("process '{}' has no match", process.name),
+              "add 'match: {name: PROGRAM}' or 'match: {command: \"*/PROGRAM *\"}'");
+      } else {
+        read_match(*find(node, "match"), process.match, nullptr);
+      }
+      read_set_of(node, process);
+      if (const Node *workload = find(node, "workload")) read_workload_of(*workload, process);
+    }
+    robot_.processes.push_back(std::move(process));
+  }
+
+  void read_set_of(const Node &node, Process &process) {
+    const Node *cpus_node = find(node, "cpus");
+    if (cpus_node == nullptr) {
+      if (robot_.cpu_sets.size() < 2) return;
+      error(node, fmt::format("process '{}' names no CPU set", process.name),
+            "add 'cpus:' with one of " + names_of_sets());
+      return;
+    }
+    if (const auto set = set_named(*cpus_node)) {
+      process.cpu_set = *set;
+    } else if (!is_broken_) {
+      error(*cpus_node,
+            fmt::format("there is no CPU set {}, which process '{}' names", describe(*cpus_node), process.name),
+            robot_.cpu_sets.front().name.empty() ? "remove 'cpus:', or replace the robot's 'cpus' by 'cpu_sets'"
+                                                 : "choose one of " + names_of_sets());
+    }
+  }
+
+  [[nodiscard]] std::optional<std::size_t> set_named(const Node &node) const {
+    const auto found = names_of_sets_.find(node.text);
+    return node.kind == Node::Kind::Scalar && found != names_of_sets_.end() ? std::optional(found->second)
+                                                                            : std::nullopt;
+  }
+
+  [[nodiscard]] std::string names_of_sets() const {
+    std::vector<std::string_view> names;
+    for (const CpuSet &set : robot_.cpu_sets) names.emplace_back(set.name);
+    return fmt::format("{}", fmt::join(names, ", "));
+  }
+
+  // Reads which processes are meant. `threads` is null for a process.
+  void read_match(const Node &node, ProcessMatch &match, Threads *threads) {
+    std::vector<std::string_view> keys = {"name", "command", "cgroup"};
+    if (threads != nullptr) keys.insert(keys.end(), {"thread", "process"});
+    if (!check_map(node, "match", keys)) return;
+    take_text(node, "name", match.name);
+    take_text(node, "command", match.command);
+    take_text(node, "cgroup", match.cgroup);
+    if (threads != nullptr) take_text(node, "thread", threads->thread);
+    if (node.children.empty()) {
+      error(node, "match would match everything", fmt::format("add one of {}", fmt::join(keys, ", ")));
+    }
+    constexpr std::size_t kMostOfName = 15;
+    for (const char *key : {"name", "thread"}) {
+      const Node *name = find(node, key);
+      if (name == nullptr || name->text.size() <= kMostOfName || name->text.find('*') != std::string::npos) continue;
+      error(*name, fmt::format("{} '{}' matches nothing: the kernel keeps 15 characters of a name", key, name->text),
+            fmt::format("write '{}', or match the command", name->text.substr(0, kMostOfName)));
+    }
+    const Node *process = threads == nullptr ? nullptr : find(node, "process");
+    if (process == nullptr) return;
+    if (!match.is_empty()) {
+      error(*process, "match has both 'process' and another way to name processes", "remove one of them");
+    }
+    threads->process = process_named(*process, describe(*process));
+  }
+
+  std::optional<std::size_t> process_named(const Node &at, const std::string &described) {
+    const auto found = names_of_processes_.find(at.text);
+    if (at.kind == Node::Kind::Scalar && found != names_of_processes_.end()) return found->second;
+    if (is_broken_) return std::nullopt;
+    std::vector<std::string_view> names;
+    for (const Process &process : robot_.processes) names.emplace_back(process.name);
+    error(at, fmt::format("there is no process {}", described), did_you_mean(at.text, names, "add it to 'processes:'"));
+    return std::nullopt;
+  }
+
+  void read_workload_of(const Node &node, Process &process) {
+    Result<LoadedWorkload> loaded = [&]() -> Result<LoadedWorkload> {
+      if (node.kind == Node::Kind::Map) return read_workload(node, file_, options_);
+      const std::optional<std::string> path = text(node, "workload");
+      if (!path) return tl::unexpected(Diagnostics{});
+      return load_workload(std::filesystem::path(file_).parent_path() / *path, options_);
+    }();
+    const bool is_inline = node.kind == Node::Kind::Map;
+    if (!loaded && !is_inline && !loaded.error().empty()) {
+      error(node, fmt::format("the workload {} cannot be used", describe(node)), "its mistakes are listed below");
+    }
+    const Diagnostics &found = loaded ? loaded->warnings : loaded.error();
+    std::copy(found.begin(), found.end(), std::back_inserter(is_inline ? diagnostics_ : of_other_files_));
+    if (!loaded) {
+      is_broken_ = true;
+      return;
+    }
+    process.workload = std::move(loaded->workload);
+    process.states_workers = loaded->states_workers;
+    if (process.workload->policy != PolicyKind::Fixed && robot_.policy == PolicyKind::Fixed) {
+      warn(node,
+           fmt::format("policy of the robot is fixed, but the workload of process '{}' is ordered by {}", process.name,
+                       to_string(process.workload->policy)),
+           "its tasks without 'priority' have priority 0");
+    }
+  }
+
+  void warn(const Node &at, std::string message, std::string hint) {
+    diagnostics_.push_back(
+        Diagnostic{Severity::Warning, file_, at.line, at.column, std::move(message), std::move(hint)});
+  }
+
+  void read_threads(const Node &node) {
+    Threads threads;
+    threads.place = place_of(node);
+    if (!check_map(node, "an entry of threads", {"name", "match", "level", "cpus", "count", "wcet", "period"}) ||
+        !take_name(node, "an entry of threads", names_of_threads_, robot_.threads.size(), threads.name)) {
+      return;
+    }
+    if (const Node *match = find(node, "match")) {
+      read_match(*match, threads.match, &threads);
+    } else {
+      error(node, fmt::format("threads '{}' have no match", threads.name),
+            "add 'match: {thread: NAME}' or 'match: {process: PROCESS, thread: NAME}'");
+    }
+    if (const Node *level = find(node, "level")) threads.level = read_level(*level);
+    if (const Node *cpus_node = find(node, "cpus")) threads.cpus = read_cpus(*cpus_node);
+    if (find(node, "level") == nullptr && find(node, "cpus") == nullptr) {
+      error(node, fmt::format("threads '{}' have neither a level nor cpus", threads.name),
+            "add 'level:' or 'cpus:', or remove the entry");
+    }
+    take(node, "count", threads.count,
+         [this](const Node &value, auto key) { return integer<std::uint32_t>(value, key, 1, kMostThreads); });
+    take(node, "wcet", threads.wcet, [this](const Node &value, auto key) { return positive_duration(value, key); });
+    take(node, "period", threads.period, [this](const Node &value, auto key) { return positive_duration(value, key); });
+    check_load(node, threads);
+    robot_.threads.push_back(std::move(threads));
+  }
+
+  // A load is what the analysis has to know of threads that interfere with tasks.
+  void check_load(const Node &node, Threads &threads) {
+    const Node *wcet = find(node, "wcet");
+    const Node *period = find(node, "period");
+    const bool of_rate = threads.level && threads.level->kind == Level::Kind::Rate;
+    if (of_rate && period != nullptr) {
+      error(*period, fmt::format("threads '{}' have both a period and a rate", threads.name),
+            "remove 'period:'; the rate is their period");
+    }
+    if (of_rate) threads.period = threads.level->rate;
+    if (threads.level && !threads.level->interferes() && (wcet != nullptr || period != nullptr)) {
+      error(wcet != nullptr ? *wcet : *period,
+            fmt::format("threads '{}' delay no task at this level, and need no wcet or period", threads.name),
+            "remove 'wcet:' and 'period:'");
+    } else if (wcet != nullptr && period == nullptr && !of_rate) {
+      error(*wcet, fmt::format("threads '{}' have a wcet, but no period", threads.name), "add 'period:'");
+    } else if (wcet == nullptr && period != nullptr) {
+      error(*period, fmt::format("threads '{}' have a period, but no wcet", threads.name), "add 'wcet:'");
+    }
+    if (threads.wcet > 0 && threads.period > 0 && threads.wcet > threads.period) {
+      error(*wcet, fmt::format("wcet {} of threads '{}' exceeds their period {}", format_duration(threads.wcet),
+                               threads.name, format_duration(threads.period)));
+    }
+  }
+
+  std::optional<Level> read_level(const Node &node) {
+    Level level;
+    if (node.kind == Node::Kind::Scalar && (node.text == "above" || node.text == "below")) {
+      level.kind = node.text == "above" ? Level::Kind::Above : Level::Kind::Below;
+      return level;
+    }
+    if (node.kind != Node::Kind::Map) {
+      unknown_choice(
+          node, "level",
+          {"above", "below", "{task: PROCESS.DAG.TASK}", "{rate: PERIOD}", "{fifo: PRIORITY}", "{nice: NICE}"});
+      return std::nullopt;
+    }
+    if (!check_map(node, "level", {"task", "rate", "fifo", "nice"})) return std::nullopt;
+    if (node.children.size() != 2) {
+      error(node, "level must have one of task, rate, fifo and nice");
+      return std::nullopt;
+    }
+    const Node &value = node.children[1];
+    bool is_read = false;
+    if (find(node, "task") != nullptr) return read_task(value);
+    if (find(node, "rate") != nullptr) {
+      level.kind = Level::Kind::Rate;
+      is_read = take(node, "rate", level.rate, [this](const Node &at, auto key) { return positive_duration(at, key); });
+      if (robot_.policy == PolicyKind::Fixed) {
+        error(value, "a rate has no place in an order by policy fixed", "use task, above, below or fifo");
+        is_read = false;
+      }
+    } else {
+      const bool fifo = find(node, "fifo") != nullptr;
+      level.kind = fifo ? Level::Kind::Fifo : Level::Kind::Nice;
+      is_read = take(node, fifo ? "fifo" : "nice", level.value, [&](const Node &at, auto key) {
+        return integer<int>(at, key, fifo ? 1 : kLeastNice, fifo ? kMostFifo : kMostNice);
+      });
+    }
+    return is_read ? std::optional(level) : std::nullopt;
+  }
+
+  // Finds "process.dag.task". Any of the names can contain dots.
+  std::optional<Level> read_task(const Node &node) {
+    const std::optional<std::string> name = text(node, "task");
+    if (!name || is_broken_) return std::nullopt;
+    if (tasks_.empty()) {
+      for (std::size_t p = 0; p < robot_.processes.size(); ++p) {
+        const Process &process = robot_.processes[p];
+        if (!process.workload) continue;
+        for (const TaskRef &ref : flatten(*process.workload)) {
+          const Dag &dag = process.workload->dags[ref.dag.value];
+          tasks_.emplace(fmt::format("{}.{}.{}", process.name, dag.name, ref.task->name), std::pair(p, ref.id));
+        }
+      }
+    }
+    const auto found = tasks_.find(*name);
+    if (found != tasks_.end()) {
+      Level level;
+      level.kind = Level::Kind::Task;
+      std::tie(level.process, level.task) = found->second;
+      return level;
+    }
+    std::vector<std::string_view> names;
+    for (const auto &[each, place] : tasks_) names.emplace_back(each);
+    std::sort(names.begin(), names.end());
+    error(node, fmt::format("there is no task {}", in_quotes(*name)),
+          did_you_mean(*name, names, "write PROCESS.DAG.TASK, such as 'base.control.pid'"));
+    return std::nullopt;
+  }
+
+  // Reads the name of a CPU set, or processors.
+  std::vector<int> read_cpus(const Node &node) {
+    if (const auto set = set_named(node)) return robot_.cpu_sets[*set].cpus;
+    if (node.kind == Node::Kind::Scalar && !parse_cpu_list(node.text)) {
+      if (is_broken_) return {};
+      wrong_type(node, "cpus", "a CPU set or a list of processors such as 0-3");
+      std::vector<std::string_view> names;
+      for (const CpuSet &set : robot_.cpu_sets) names.emplace_back(set.name);
+      diagnostics_.back().hint = did_you_mean(node.text, names, "");
+      return {};
+    }
+    return cpus(node, "cpus").value_or(std::vector<int>{});
+  }
+
+  void read_interrupts(const Node &node) {
+    Interrupts interrupts;
+    interrupts.place = place_of(node);
+    if (!check_map(node, "an entry of irqs", {"name", "match", "cpus"}) ||
+        !take_name(node, "an entry of irqs", names_of_interrupts_, robot_.interrupts.size(), interrupts.name)) {
+      return;
+    }
+    if (find(node, "match") == nullptr) {
+      error(node, fmt::format("irqs '{}' have no match", interrupts.name),
+            "add 'match:' with a name from /proc/interrupts");
+    }
+    take_text(node, "match", interrupts.match);
+    if (const Node *cpus_node = find(node, "cpus")) {
+      interrupts.cpus = read_cpus(*cpus_node);
+    } else {
+      error(node, fmt::format("irqs '{}' have no cpus", interrupts.name), "add 'cpus:'");
+    }
+    robot_.interrupts.push_back(std::move(interrupts));
+  }
+
+  const Node &root_;
+  LoadOptions options_;
+  Robot robot_;
+  Diagnostics of_other_files_;
+  // Some entry is lost: names that are unknown may be its own.
+  bool is_broken_ = false;
+  Names names_of_sets_;
+  Names names_of_processes_;
+  Names names_of_threads_;
+  Names names_of_interrupts_;
+  std::unordered_set<int> owned_;  // processors of CPU sets
+  std::unordered_map<std::string, std::pair<std::size_t, TaskId>> tasks_;
+};
+
+}  // namespace
+
+bool is_robot(const Node &root) { return root.kind == Node::Kind::Map && find(root, "robot") != nullptr; }
+
+Result<LoadedRobot> read_robot(const Node &root, const std::string &file, LoadOptions options) {
+  return RobotReader(root, file, options).run();
+}
+
+}  // namespace redag::robot

@@ -1,0 +1,202 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+#include "redag_lab/robot/union.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "redag/model/validate.hpp"
+#include "redag_lab/robot/order.hpp"
+
+namespace redag::robot {
+namespace {
+
+// Joins the name of a process with that of a DAG or group in it.
+std::string joined(const std::string &process, const std::string &name) { return process + "/" + name; }
+
+constexpr const char *kThreads = "threads";
+constexpr int kAbove = -1;  // the level above those of the order
+
+class Union {
+ public:
+  Union(const Robot &robot, std::uint32_t levels) : robot_(robot), order_(order_of(robot, levels)) {
+    workload_.name = robot.name;
+    workload_.policy = robot.policy;
+    workload_.platform.preemption = PreemptionMode::Os;
+  }
+
+  Result<LoadedWorkload> run(LoadOptions options) {
+    for (std::size_t p = 0; p < robot_.processes.size(); ++p) add_process(p);
+    for (std::size_t t = 0; t < robot_.threads.size(); ++t) add_threads(t);
+    if (mistakes_.empty() && workload_.dags.empty()) {
+      mistakes_.push_back(
+          Diagnostic{Severity::Error, {}, 0, 0, "no process of the robot has a workload", "add 'workload:' to one"});
+    }
+    if (!mistakes_.empty()) return tl::unexpected<Diagnostics>(std::move(mistakes_));
+    set_platform();
+    if (order_.is_merged() || has_above_) fix_priorities();
+    Diagnostics found = validate(workload_, options);
+    if (has_errors(found)) return tl::unexpected<Diagnostics>(std::move(found));
+    return LoadedWorkload{std::move(workload_), std::move(found), true};
+  }
+
+ private:
+  void refuse(const Place &at, std::string message, std::string hint) {
+    mistakes_.push_back(Diagnostic{Severity::Error, at.file, at.line, at.column, std::move(message), std::move(hint)});
+  }
+
+  void add_process(std::size_t p) {
+    const Process &process = robot_.processes[p];
+    if (!process.workload) return;
+    check_executor(p);
+    if (process.name == kThreads) {
+      refuse(process.place, "the name 'threads' of a process is that of all threads in the union",
+             "choose another name");
+    }
+    for (const Dag &original : process.workload->dags) {
+      Dag &dag = workload_.dags.emplace_back(original);
+      dag.name = joined(process.name, dag.name);
+      dag.cluster = {};
+      for (Task &task : dag.tasks) {
+        if (!task.group.empty()) task.group = joined(process.name, task.group);
+      }
+      set_of_dag_.push_back(process.cpu_set);
+    }
+    levels_.insert(levels_.end(), order_.of_task[p].begin(), order_.of_task[p].end());
+  }
+
+  // Within its process, an executor decides which jobs the kernel gets to choose from.
+  void check_executor(std::size_t p) {
+    const Process &process = robot_.processes[p];
+    const Workload &workload = *process.workload;
+    if (!workload.platform.clusters.empty()) {
+      refuse(process.place, fmt::format("process '{}' has clusters of its own", process.name),
+             "make each cluster a process, and its processors a CPU set");
+      return;
+    }
+    if (!has_executor(robot_, p)) return;
+    if (workload.policy != robot_.policy) {
+      refuse(process.place,
+             fmt::format("process '{}' orders its jobs by {}, and the robot by {}", process.name,
+                         to_string(workload.policy), to_string(robot_.policy)),
+             fmt::format("write 'policy: {}' in the workload of the process, or change the robot's",
+                         to_string(robot_.policy)));
+    }
+    const PreemptionMode preemption = workload.platform.preemption;
+    if (preemption != PreemptionMode::Os && preemption != PreemptionMode::Auto) {
+      refuse(
+          process.place,
+          fmt::format("process '{}' runs with preemption {}: its urgent jobs wait for its own less urgent ones, while "
+                      "those wait for other processes",
+                      process.name, to_string(preemption)),
+          "write 'preemption: os' in its workload");
+    }
+    const std::size_t cpus = robot_.cpu_sets[process.cpu_set].cpus.size();
+    if (process.states_workers && workload.platform.workers < cpus) {
+      refuse(process.place,
+             fmt::format("process '{}' has {} worker{} for {} processors: a processor can be idle while a job waits, "
+                         "which no bound for all processes covers",
+                         process.name, workload.platform.workers, workload.platform.workers == 1 ? "" : "s", cpus),
+             fmt::format("write 'workers: {}' in its workload, or leave it out", cpus));
+    }
+  }
+
+  void add_threads(std::size_t t) {
+    const Threads &threads = robot_.threads[t];
+    if (!threads.level) return;
+    if (threads.level->kind == Level::Kind::Task) {
+      const Process &process = robot_.processes[threads.level->process];
+      if (threads.cpus.empty() || threads.cpus == robot_.cpu_sets[process.cpu_set].cpus) return;
+      refuse(threads.place,
+             fmt::format("threads '{}' execute a task of process '{}', but on other processors than it has",
+                         threads.name, process.name),
+             "remove 'cpus:' of the threads");
+      return;
+    }
+    if (!threads.level->interferes()) return;
+    const std::optional<std::size_t> set = set_of(threads);
+    if (!set) return;
+    if (threads.wcet == 0) {
+      refuse(threads.place, fmt::format("threads '{}' can delay tasks, and nothing says for how long", threads.name),
+             "add 'wcet:' and 'period:': what one of them executes at most, and how often; or use a level below");
+      return;
+    }
+    Dag &dag = workload_.dags.emplace_back();
+    dag.name = joined(kThreads, threads.name);
+    for (std::uint32_t i = 0; i < threads.count; ++i) {
+      Task &task = dag.tasks.emplace_back();
+      task.name = threads.count == 1 ? "run" : fmt::format("run_{}", i + 1);
+      task.wcet = threads.wcet;
+      task.period = task.deadline = threads.period;
+      levels_.push_back(order_.of_threads[t] ? static_cast<int>(*order_.of_threads[t]) : kAbove);
+    }
+    has_above_ = has_above_ || !order_.of_threads[t];
+    set_of_dag_.push_back(*set);
+  }
+
+  // Returns the CPU set where these threads run; nothing if no task runs where they do, or after a refusal.
+  std::optional<std::size_t> set_of(const Threads &threads) {
+    std::vector<std::size_t> met;
+    for (std::size_t s = 0; s < robot_.cpu_sets.size(); ++s) {
+      const std::vector<int> &cpus = robot_.cpu_sets[s].cpus;
+      const bool meets = threads.cpus.empty() || std::any_of(cpus.begin(), cpus.end(), [&](int cpu) {
+                           return std::binary_search(threads.cpus.begin(), threads.cpus.end(), cpu);
+                         });
+      if (meets) met.push_back(s);
+    }
+    if (met.empty()) return std::nullopt;
+    const std::vector<int> &cpus = robot_.cpu_sets[met.front()].cpus;
+    if (met.size() == 1 && (threads.cpus.empty() || threads.cpus == cpus)) return met.front();
+    refuse(threads.place,
+           fmt::format("threads '{}' can delay tasks, and their processors are not those of one CPU set", threads.name),
+           "give them the 'cpus:' of one CPU set, or processors of none");
+    return std::nullopt;
+  }
+
+  // One CPU set with tasks is the platform; several are its clusters.
+  void set_platform() {
+    std::vector<std::size_t> used = set_of_dag_;
+    std::sort(used.begin(), used.end());
+    used.erase(std::unique(used.begin(), used.end()), used.end());
+    Platform &platform = workload_.platform;
+    platform.workers = 0;
+    for (const std::size_t s : used) {
+      const CpuSet &set = robot_.cpu_sets[s];
+      const auto workers = static_cast<std::uint32_t>(set.cpus.size());
+      platform.workers += workers;
+      if (used.size() > 1) platform.clusters.push_back(Cluster{set.name, workers, set.cpus});
+    }
+    if (used.size() == 1) return;
+    for (std::size_t d = 0; d < workload_.dags.size(); ++d) {
+      workload_.dags[d].cluster = robot_.cpu_sets[set_of_dag_[d]].name;
+    }
+  }
+
+  // The order is not that of rates or deadlines alone: states it task by task.
+  void fix_priorities() {
+    workload_.policy = PolicyKind::Fixed;
+    std::size_t id = 0;
+    for (Dag &dag : workload_.dags) {
+      for (Task &task : dag.tasks) task.priority = -levels_[id++];
+    }
+  }
+
+  const Robot &robot_;
+  Order order_;
+  Workload workload_;
+  Diagnostics mistakes_;
+  std::vector<std::size_t> set_of_dag_;
+  std::vector<int> levels_;  // by TaskId of the union
+  bool has_above_ = false;   // some task is above all levels of the order
+};
+
+}  // namespace
+
+Result<LoadedWorkload> union_of(const Robot &robot, std::uint32_t levels, LoadOptions options) {
+  return Union(robot, levels).run(options);
+}
+
+}  // namespace redag::robot

@@ -1,0 +1,229 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+#include "redag_lab/robot/union.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <algorithm>
+#include <string>
+
+#include "redag/sched/policy.hpp"
+#include "redag_lab/robot/order.hpp"
+#include "redag_testing/builders.hpp"
+#include "redag_testing/random_workloads.hpp"
+
+namespace redag::robot {
+namespace {
+
+using testing::make_dag;
+using testing::make_workload;
+
+constexpr std::uint32_t kLevels = 79;
+
+Robot robot_of(std::vector<Workload> workloads, std::vector<CpuSet> sets = {CpuSet{"", {0, 1}}}) {
+  Robot robot;
+  robot.name = "cart";
+  robot.cpu_sets = std::move(sets);
+  for (Workload &workload : workloads) {
+    Process process;
+    process.name = fmt::format("p{}", robot.processes.size());
+    process.place = {"cart.yaml", static_cast<int>(robot.processes.size()) + 10, 5};
+    process.cpu_set = std::min(robot.processes.size(), robot.cpu_sets.size() - 1);
+    process.workload = std::move(workload);
+    robot.processes.push_back(std::move(process));
+  }
+  return robot;
+}
+
+Workload one_task(Duration period, Duration wcet = 1, std::string group = {}) {
+  return make_workload({make_dag("d", {{.name = "t", .period = period, .wcet = wcet, .group = std::move(group)}})}, 2,
+                       PreemptionMode::Os);
+}
+
+Threads threads_at(Level::Kind kind, Duration wcet, Duration period) {
+  Threads threads;
+  threads.name = "x";
+  threads.level = Level{};
+  threads.level->kind = kind;
+  threads.level->rate = period;
+  threads.wcet = wcet;
+  threads.period = period;
+  threads.place = {"cart.yaml", 30, 5};
+  return threads;
+}
+
+std::string refusal(const Robot &robot) {
+  const Result<LoadedWorkload> united = union_of(robot, kLevels);
+  return united ? "accepted" : to_string(united.error());
+}
+
+// Random workloads in processes are the workload that one would write by hand: their DAGs one after the other, with
+// names and groups of their own.
+RC_GTEST_PROP(RobotUnion, IsTheWorkloadWrittenByHand, ()) {
+  Rng rng(*rc::gen::arbitrary<std::uint64_t>());
+  const std::uint32_t count = testing::between(rng, 1, 4);
+  Robot robot = robot_of({});
+  robot.policy = testing::chance(rng, 0.5) ? PolicyKind::RateMonotonic : PolicyKind::DeadlineMonotonic;
+  Workload by_hand;
+  by_hand.name = "cart";
+  by_hand.policy = robot.policy;
+  by_hand.platform = Platform{2, PreemptionMode::Os};
+  for (std::uint32_t p = 0; p < count; ++p) {
+    Workload workload = testing::random_workload(rng);
+    workload.policy = robot.policy;
+    workload.platform = Platform{testing::between(rng, 2, 5), PreemptionMode::Os};
+    Process process;
+    process.name = std::string(1, static_cast<char>('a' + p));
+    process.workload = workload;
+    process.states_workers = true;
+    for (Dag &dag : workload.dags) {
+      dag.name = process.name + "/" + dag.name;
+      for (Task &task : dag.tasks) {
+        if (!task.group.empty()) task.group = process.name + "/" + task.group;
+      }
+      by_hand.dags.push_back(dag);
+    }
+    robot.processes.push_back(std::move(process));
+  }
+  const Result<LoadedWorkload> united = union_of(robot, kLevels);
+  RC_ASSERT(united.has_value());
+  RC_ASSERT(united->workload == by_hand);
+}
+
+// With too few levels the union states the order of levels, and thereby which tasks cannot preempt each other.
+RC_GTEST_PROP(RobotUnion, StatesMergedLevels, ()) {
+  Rng rng(*rc::gen::arbitrary<std::uint64_t>());
+  Robot robot = robot_of({testing::random_workload(rng), testing::random_workload(rng)});
+  for (Process &process : robot.processes) {
+    process.workload->policy = PolicyKind::RateMonotonic;
+    process.workload->platform = Platform{2, PreemptionMode::Os};
+  }
+  const std::uint32_t levels = testing::between(rng, 1, 3);
+  const Result<LoadedWorkload> united = union_of(robot, levels);
+  RC_ASSERT(united.has_value());
+  Workload by_rate = united->workload;
+  by_rate.policy = PolicyKind::RateMonotonic;
+  const auto merged = sched::assign_priorities(by_rate.dags, PolicyKind::RateMonotonic, Ties::Share, levels);
+  const auto stated = sched::assign_priorities(united->workload.dags, united->workload.policy, Ties::Share);
+  for (std::size_t t = 0; t < merged.size(); ++t) {
+    for (std::size_t u = 0; u < merged.size(); ++u) {
+      RC_ASSERT((merged[t].level < merged[u].level) == (stated[t].level < stated[u].level));
+    }
+  }
+}
+
+TEST(RobotUnion, KeepsGroupsOfProcessesApart) {
+  const Result<LoadedWorkload> united = union_of(robot_of({one_task(5, 1, "bus"), one_task(10, 1, "bus")}), kLevels);
+  ASSERT_TRUE(united);
+  EXPECT_EQ(united->workload.dags[0].tasks[0].group, "p0/bus");
+  EXPECT_EQ(united->workload.dags[1].tasks[0].group, "p1/bus");
+}
+
+TEST(RobotUnion, CpuSetsAreClusters) {
+  const Result<LoadedWorkload> united = union_of(
+      robot_of({one_task(5), one_task(10)}, {CpuSet{"fast", {0}}, CpuSet{"rest", {1, 2}}, CpuSet{"idle", {3}}}),
+      kLevels);
+  ASSERT_TRUE(united) << to_string(united.error());
+  const Platform &platform = united->workload.platform;
+  ASSERT_EQ(platform.clusters.size(), 2u) << "a set without tasks is none";
+  EXPECT_EQ(platform.clusters[1], (Cluster{"rest", 2, {1, 2}}));
+  EXPECT_EQ(platform.workers, 3u);
+  EXPECT_EQ(united->workload.dags[1].cluster, "rest");
+}
+
+TEST(RobotUnion, RefusesFewerWorkersThanProcessors) {
+  Robot robot = robot_of({one_task(5), one_task(10)});
+  robot.processes[1].workload->platform.workers = 1;
+  EXPECT_EQ(refusal(robot), "accepted") << "a workload that states none has one worker for each processor";
+  robot.processes[1].states_workers = true;
+  EXPECT_EQ(refusal(robot),
+            "cart.yaml:11:5: error: process 'p1' has 1 worker for 2 processors: a processor can be idle while a job "
+            "waits, which no bound for all processes covers (write 'workers: 2' in its workload, or leave it out)");
+}
+
+TEST(RobotUnion, RefusesOtherOrdersAndModes) {
+  Robot robot = robot_of({one_task(5)});
+  robot.processes[0].workload->policy = PolicyKind::Edf;
+  EXPECT_EQ(
+      refusal(robot),
+      "cart.yaml:10:5: error: process 'p0' orders its jobs by edf, and the robot by rate_monotonic (write 'policy: "
+      "rate_monotonic' in the workload of the process, or change the robot's)");
+  robot = robot_of({one_task(5)});
+  robot.processes[0].workload->platform.preemption = PreemptionMode::Cooperative;
+  EXPECT_NE(refusal(robot).find("runs with preemption cooperative"), std::string::npos) << refusal(robot);
+  robot.threads.push_back(threads_at(Level::Kind::Task, 0, 0));
+  robot.threads[0].level->task = TaskId(0);
+  EXPECT_EQ(refusal(robot), "accepted") << "threads execute all its tasks: no executor chooses";
+}
+
+TEST(RobotUnion, ThreadsOfARateAreTasks) {
+  Robot robot = robot_of({one_task(5), one_task(20)});
+  robot.threads.push_back(threads_at(Level::Kind::Rate, kMillisecond, 10 * kMillisecond));
+  robot.threads[0].count = 2;
+  const Result<LoadedWorkload> united = union_of(robot, kLevels);
+  ASSERT_TRUE(united) << to_string(united.error());
+  EXPECT_EQ(united->workload.policy, PolicyKind::RateMonotonic);
+  const Dag &dag = united->workload.dags.back();
+  EXPECT_EQ(dag.name, "threads/x");
+  ASSERT_EQ(dag.tasks.size(), 2u);
+  EXPECT_EQ(dag.tasks[1].period, 10 * kMillisecond);
+  EXPECT_EQ(dag.tasks[1].wcet, kMillisecond);
+}
+
+TEST(RobotUnion, ThreadsAboveComeFirstWhateverTheirPeriod) {
+  Robot robot = robot_of({one_task(5), one_task(20)});
+  robot.threads.push_back(threads_at(Level::Kind::Above, kMillisecond, 50 * kMillisecond));
+  const Result<LoadedWorkload> united = union_of(robot, kLevels);
+  ASSERT_TRUE(united) << to_string(united.error());
+  EXPECT_EQ(united->workload.policy, PolicyKind::Fixed);
+  const auto order = sched::assign_priorities(united->workload.dags, united->workload.policy, Ties::Share);
+  EXPECT_EQ(order[2].level, 0u);
+  EXPECT_EQ(order[0].level, 1u);
+  EXPECT_EQ(order[1].level, 2u);
+}
+
+TEST(RobotUnion, RefusesThreadsThatDelayTasksForAnUnknownTime) {
+  Robot robot = robot_of({one_task(5), one_task(20)});
+  robot.threads.push_back(threads_at(Level::Kind::Above, 0, 0));
+  EXPECT_NE(refusal(robot).find("cart.yaml:30:5: error: threads 'x' can delay tasks, and nothing says for how long"),
+            std::string::npos)
+      << refusal(robot);
+  robot.threads[0].level->kind = Level::Kind::Below;
+  EXPECT_EQ(refusal(robot), "accepted");
+  robot.threads[0].level->kind = Level::Kind::Fifo;
+  robot.threads[0].level->value = 1;
+  EXPECT_EQ(refusal(robot), "accepted");
+  robot.threads[0].level->value = 2;
+  EXPECT_NE(refusal(robot), "accepted");
+  robot.threads[0].cpus = {7};
+  EXPECT_EQ(refusal(robot), "accepted") << "no task runs there";
+  robot.threads[0].wcet = 1;
+  robot.threads[0].period = 10;
+  robot.threads[0].cpus = {1};
+  EXPECT_NE(refusal(robot).find("their processors are not those of one CPU set"), std::string::npos) << refusal(robot);
+}
+
+TEST(RobotOrder, RatesOfAllProcessesInterleave) {
+  Robot robot = robot_of({one_task(5), one_task(10), one_task(20)});
+  robot.processes[0].workload->dags.push_back(make_dag("slow", {{.name = "t", .period = 20}}));
+  robot.threads.push_back(threads_at(Level::Kind::Rate, 0, 7 * kMillisecond));
+  robot.threads.push_back(threads_at(Level::Kind::Nice, 0, 0));
+  const Order order = order_of(robot, kLevels);
+  EXPECT_EQ(order.of_task[0], (std::vector<std::uint32_t>{0, 3}));
+  EXPECT_EQ(order.of_task[1], (std::vector<std::uint32_t>{2}));
+  EXPECT_EQ(order.of_task[2], (std::vector<std::uint32_t>{3})) << "the same rate, the same level";
+  EXPECT_EQ(order.of_threads[0], 1u);
+  EXPECT_FALSE(order.of_threads[1]);
+  EXPECT_FALSE(order.is_merged());
+  EXPECT_EQ(order.ranks, 4u);
+  const Order merged = order_of(robot, 2);
+  EXPECT_TRUE(merged.is_merged());
+  EXPECT_EQ(merged.levels, 2u);
+  EXPECT_EQ(merged.of_task[0], (std::vector<std::uint32_t>{0, 1}));
+}
+
+}  // namespace
+}  // namespace redag::robot
