@@ -133,7 +133,9 @@ TEST(Waits, KeepTheirOrderInJobsOfAnyLength) {
       for (std::size_t w = 0; w < task.waits.size(); ++w) {
         const Duration point = wait_point(task, w, demand);
         EXPECT_GT(point, last) << seed;
-        if (demand == task.wcet) EXPECT_EQ(point, task.waits[w].after);
+        if (demand == task.wcet) {
+          EXPECT_EQ(point, task.waits[w].after);
+        }
         last = point;
       }
       EXPECT_LT(last, demand) << seed;
