@@ -348,7 +348,7 @@ inline void PriorityDispatcher::leave_worker(const Job &job) {
 [[gnu::noinline]] void PriorityDispatcher::leave_queue(std::uint32_t slot) {
   const Job &job = table_.jobs[slot];
   if (is_in_ready_queue(job)) return remove(slot);
-  REDAG_CHECK(job.state != JobState::Suspended, "a job ended or waits that is suspended under another");
+  REDAG_CHECK(job.state != JobState::Suspended, "a job ended that is suspended under another");
   devices_.leave(slot);
 }
 

@@ -65,7 +65,9 @@ std::string to_text(const trace::Trace &trace, const Explanation &explanation) {
 }
 
 trace::RunInfo drawn(Rng &rng, std::uint64_t seed) {
-  trace::RunInfo info = testing::run_info(testing::contended(rng), "redag", seed);
+  Workload workload = testing::contended(rng);
+  if (chance(rng, 0.3)) testing::add_waits(rng, workload);
+  trace::RunInfo info = testing::run_info(std::move(workload), "redag", seed);
   if (info.config.preemption == sched::Preemption::Full) {
     if (is_static(info.config.policy) && chance(rng, 0.5)) info.config.levels = between(rng, 1, 5);
     if (chance(rng, 0.5)) info.config.max_started = info.config.workers + between(rng, 0, 2);
@@ -91,7 +93,8 @@ std::map<JobId, Duration> suspended_in(const trace::Trace &trace) {
   for (const JobEvent &event : trace.events) {
     const JobId job{event.task, event.job};
     if (event.kind == JobEventKind::Preempted) since[job] = event.time;
-    if (event.kind == JobEventKind::Resumed) total[job] += event.time - since[job];
+    if (event.kind == JobEventKind::Waits) since[job] = kNever;
+    if (event.kind == JobEventKind::Resumed && since[job] != kNever) total[job] += event.time - since[job];
   }
   return total;
 }
@@ -167,6 +170,23 @@ RC_GTEST_PROP(Why, PartsSumExactlyForDamagedTraces, ()) {
   trace.info.driver = static_cast<trace::Driver>(between(rng, 0, 3));
   for (const bool end_to_end : {false, true}) {
     for (const Explanation &one : explain_all(trace, end_to_end)) RC_ASSERT(sum_of(one) == one.length());
+  }
+}
+
+// hi waits for the device behind lo, which it serves first; then the device serves hi.
+TEST(Why, AWaitIsNoDelayAndTheQueueOfADeviceIsOne) {
+  Workload workload = make_workload({make_dag("a", {{"hi", 20, 2}}), make_dag("b", {{"lo", 40, 2}})}, 2);
+  for (Dag &dag : workload.dags)
+    dag.tasks[0].waits = {Wait{kMillisecond, 3 * kMillisecond, 0, DeviceId(std::size_t{0})}};
+  workload.platform.devices = {Device{"gpu"}};
+  workload.dags[0].tasks[0].offset = kMillisecond;
+  const trace::Trace trace = simulated(testing::run_info(workload), 15 * kMillisecond);
+  for (const Explanation &one : explain_all(trace)) {
+    const bool is_hi = one.job.task == TaskId(0);
+    EXPECT_EQ(time_of(one, {Cause::Waited}), 3 * kMillisecond) << to_text(trace, one);
+    EXPECT_EQ(time_of(one, {Cause::DeviceQueue}), is_hi ? 2 * kMillisecond : 0) << to_text(trace, one);
+    EXPECT_EQ(time_of(one, {Cause::Execution}), 2 * kMillisecond) << to_text(trace, one);
+    if (is_hi) EXPECT_NE(to_text(trace, one).find("its device served b.lo#0"), std::string::npos) << to_text(trace, one);
   }
 }
 

@@ -47,6 +47,15 @@ TEST(Slices, APreemptedJobHasTwoAndTellsHowEachEnded) {
                                         {ms(7), ms(9), l, 0, 0, Slice::End::Open}}));
 }
 
+TEST(Slices, AWaitEndsOne) {
+  TraceBuilder run(hi_and_lo());
+  run.at(0).arrives("l", 0).dispatched("l", 0, 0, 50).at(5).waits("l", 0, 0, -1);
+  run.at(7).woken("l", 0, -1).resumed("l", 0, 0).at(8).finished("l", 0, 0);
+  const TaskId l = run.id("l");
+  EXPECT_EQ(slices_of(run.until(9)), (std::vector<Slice>{{0, ms(5), l, 0, 0, Slice::End::Waits},
+                                                         {ms(7), ms(8), l, 0, 0, Slice::End::Finished}}));
+}
+
 TEST(Schedule, OfAShortRunIsWholeWithAViewForEachDag) {
   const trace::Trace trace = simulated(hi_and_lo(), ms(200));
   const Schedule schedule = schedule_of(trace, jobs_of(trace), 1000, 6);
