@@ -19,6 +19,7 @@ set(alone
   redag/trace/flight_recorder_test.cpp
   redag/trace/output_file_test.cpp
   redag_analysis/analyze/examples_test.cpp
+  redag_analysis/core/waiting_test.cpp
   redag_analysis/many_workers/dag_shapes_test.cpp
   redag_analysis/many_workers/global_dag_test.cpp
   redag_analysis/many_workers/global_edf.cpp
@@ -38,6 +39,7 @@ set(alone
   redag_analysis/one_worker/response_time_test.cpp
   redag_analysis/one_worker/utilization.cpp
   redag_analysis/one_worker/utilization_test.cpp
+  redag_analysis/sim/waits_test.cpp
   redag_lab/cli/analyze/analysis_report.cpp
   redag_lab/cli/analyze/analysis_report_test.cpp
   redag_lab/cli/analyze/analyze_command.cpp
