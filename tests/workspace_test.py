@@ -136,7 +136,8 @@ class Rosdep(unittest.TestCase):
             keys, folders = keys_of(package), set()
             for file in files_of(package, ".hpp", ".cpp"):
                 if package in ROS_PACKAGES or not file.name.endswith("_test.cpp"):
-                    folders.update(re.findall(r'^\s*#\s*include\s*[<"](\w+)/', file.read_text(), re.MULTILINE))
+                    found = re.findall(r'^\s*#\s*include\s*[<"](\w+)/', file.read_text(), re.MULTILINE)
+                    folders.update(folder for folder in found if not (file.parent / folder).is_dir())
             self.assertGreater(len(folders), 2, package)
             for folder in folders - OPTIONAL - {package}:
                 key = HEADER_FOLDERS.get(folder, folder)

@@ -186,8 +186,9 @@ TEST(Why, AWaitIsNoDelayAndTheQueueOfADeviceIsOne) {
     EXPECT_EQ(time_of(one, {Cause::Waited}), 3 * kMillisecond) << to_text(trace, one);
     EXPECT_EQ(time_of(one, {Cause::DeviceQueue}), is_hi ? 2 * kMillisecond : 0) << to_text(trace, one);
     EXPECT_EQ(time_of(one, {Cause::Execution}), 2 * kMillisecond) << to_text(trace, one);
-    if (is_hi)
+    if (is_hi) {
       EXPECT_NE(to_text(trace, one).find("its device served b.lo#0"), std::string::npos) << to_text(trace, one);
+    }
   }
 }
 
