@@ -77,7 +77,8 @@ set(alone
   redag_testing/kernel_judge.cpp
   redag_testing/late_data_test.cpp
   redag_testing/overload_test.cpp
-  redag_testing/schedule_script.cpp)
+  redag_testing/schedule_script.cpp
+  redag_testing/waits_test.cpp)
 foreach(source IN LISTS alone)
   if(NOT EXISTS ${PROJECT_SOURCE_DIR}/${source})
     message(FATAL_ERROR "cmake/unity.cmake lists ${source}, which is not there")
