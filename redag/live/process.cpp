@@ -9,15 +9,13 @@
 
 #include <charconv>
 #include <fstream>
-#include <iterator>
+#include <sstream>
+#include <utility>
 
 namespace redag::live {
 namespace {
 
-std::string stat_of(std::int64_t pid) {
-  std::ifstream file(fmt::format("/proc/{}/stat", pid));
-  return {std::istreambuf_iterator<char>(file), {}};
-}
+std::string stat_of(std::int64_t pid) { return text_of_proc(fmt::format("/proc/{}/stat", pid)); }
 
 bool is_zombie(const std::string &stat) {
   const std::size_t end = stat.rfind(')');
@@ -30,6 +28,13 @@ std::uint64_t own_namespace() {
 }
 
 }  // namespace
+
+std::string text_of_proc(const std::string &path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();  // A std::istreambuf_iterator would throw if the process ends between the two calls.
+  return std::move(text).str();
+}
 
 std::optional<std::uint64_t> start_time_in(const std::string &stat) {
   // The form is "PID (program) state ppid ...". The program's name can hold anything, also ") 1 2 3".

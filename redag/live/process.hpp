@@ -21,6 +21,9 @@ struct Process {
 
 [[nodiscard]] Process this_process();
 
+/// Returns the text of a file of /proc. Empty if it is not there, or its process ends meanwhile.
+[[nodiscard]] std::string text_of_proc(const std::string &path);
+
 enum class Life : std::uint8_t {
   Alive,
   Dead,

@@ -15,7 +15,6 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <sstream>
 #include <string_view>
 
@@ -45,13 +44,8 @@ static_assert(sizeof(Attributes) == 48, "SCHED_ATTR_SIZE_VER0");
 constexpr std::uint64_t kResetOnFork = 1;  // SCHED_FLAG_RESET_ON_FORK
 constexpr std::uint32_t kDeadline = 6;     // SCHED_DEADLINE
 
-std::string contents(const std::string &path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
 std::string first_line(const std::string &path) {
-  const std::string text = contents(path);
+  const std::string text = live::text_of_proc(path);
   return text.substr(0, text.find('\n'));
 }
 
@@ -165,7 +159,7 @@ bool is_same_level(const Scheduling &a, const Scheduling &b) {
 }
 
 std::optional<std::uint64_t> System::start_of(std::int64_t pid, std::int64_t tid) const {
-  return live::start_time_in(contents(fmt::format("{}/{}/task/{}/stat", proc_, pid, tid)));
+  return live::start_time_in(live::text_of_proc(fmt::format("{}/{}/task/{}/stat", proc_, pid, tid)));
 }
 
 std::optional<ThreadState> System::state_of(const ThreadId &thread) const {
@@ -199,11 +193,11 @@ Snapshot System::read() const {
     LiveProcess process;
     process.pid = pid;
     process.name = first_line(place + "comm");
-    process.command = contents(place + "cmdline");
+    process.command = live::text_of_proc(place + "cmdline");
     while (!process.command.empty() && process.command.back() == '\0') process.command.pop_back();
     std::replace(process.command.begin(), process.command.end(), '\0', ' ');
     // The hierarchy of version 2 is "0::/path". Others come before it, such as "4:memory:/path".
-    const std::string groups = contents(place + "cgroup");
+    const std::string groups = live::text_of_proc(place + "cgroup");
     const std::size_t unified = groups.rfind("0::");
     const std::size_t path = unified == std::string::npos ? groups.find('/') : unified + 3;
     if (path != std::string::npos) process.cgroup = groups.substr(path, groups.find('\n', path) - path);
@@ -218,7 +212,7 @@ Snapshot System::read() const {
 // begin with letters. What stands between the counts and the name differs between machines.
 std::vector<LiveInterrupt> System::interrupts() const {
   std::vector<LiveInterrupt> found;
-  const std::string text = contents(proc_ + "/interrupts");
+  const std::string text = live::text_of_proc(proc_ + "/interrupts");
   std::string_view rest = text;
   if (!rest.empty()) static_cast<void>(next_line(rest));  // the heading
   while (!rest.empty()) {
@@ -279,7 +273,7 @@ Result<void> System::set_cpus(int interrupt, const std::vector<int> &cpus) const
 }
 
 std::optional<std::string> System::environment_of(std::int64_t pid, const std::string &name) const {
-  const std::string text = '\0' + contents(fmt::format("{}/{}/environ", proc_, pid));
+  const std::string text = '\0' + live::text_of_proc(fmt::format("{}/{}/environ", proc_, pid));
   const std::size_t at = text.find('\0' + name + '=');
   if (at == std::string::npos) return std::nullopt;
   const std::size_t begin = at + name.size() + 2;
