@@ -300,7 +300,7 @@ TEST(ShippedWorkloads, LoadWithoutAWarning) {
   const auto paths = shipped_workloads();
   EXPECT_GE(paths.size(), 7U);
   for (const auto &path : paths) {
-    const auto loaded = load_workload(path);
+    const auto loaded = load_workload(path, {.waits = true});
     ASSERT_TRUE(loaded) << to_string(loaded.error());
     EXPECT_EQ(to_string(loaded->warnings), "");
   }

@@ -118,7 +118,8 @@ TEST(DagBuilder, KnowsEveryKeyOfTheSchema) {
   const auto text = trace::read_file((testing::repository() / "docs/workload.schema.json").string());
   ASSERT_TRUE(text);
   const nlohmann::json schema = nlohmann::json::parse(*text);
-  const std::set<std::string> elsewhere = {"callback", "cluster"};  // of ROS 2; an Executor is one cluster
+  // Of ROS 2; an Executor is one cluster; its bodies do not wait without a worker.
+  const std::set<std::string> elsewhere = {"callback", "cluster", "segments"};
   for (const char *part : {"dag", "task"}) {
     for (const auto &[key, value] : schema["definitions"][part]["properties"].items()) {
       if (elsewhere.count(key) > 0) continue;

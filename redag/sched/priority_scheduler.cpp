@@ -168,9 +168,10 @@ inline bool PriorityDispatcher::outranks(const Job &a, const Job &b) const {
   occupy(place.worker, slot);
 }
 
-[[gnu::noinline]] void PriorityDispatcher::resume(std::uint32_t slot, const Job &job, const Place &place) {
+[[gnu::noinline]] void PriorityDispatcher::resume(std::uint32_t slot, Job &job, const Place &place) {
   remove(slot);
   make_way(place);
+  job.under = table_.config.preemption == Preemption::Cooperative ? place.victim : kNil;
   table_.resume(slot, place.worker, place.victim, level_of(job));
   occupy(place.worker, slot);
 }

@@ -91,7 +91,7 @@ class PriorityDispatcher {
   [[nodiscard]] std::uint32_t level_of(const Job &job) const;
   void tell_level(std::uint32_t slot, std::uint32_t old_level);
   void start(std::uint32_t slot, Job &job, const Place &place);
-  void resume(std::uint32_t slot, const Job &job, const Place &place);
+  void resume(std::uint32_t slot, Job &job, const Place &place);
   void occupy(WorkerId worker, std::uint32_t slot);
   void note_running(std::uint32_t slot);
   void note_replaced(std::uint32_t ended, std::uint32_t slot);
