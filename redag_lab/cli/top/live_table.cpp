@@ -62,7 +62,7 @@ constexpr Column kColumns[] = {
     {Field::Waiting, "wait", 1, std::nullopt},
     {Field::Preempted, "preempted", 2, std::nullopt},
     {Field::Cpu, "cpu", 8, LiveOrder::Cpu},
-    {Field::Histogram, "responses", 7, std::nullopt},
+    {Field::Histogram, "times", 7, std::nullopt},
     {Field::Course, "p99 lately", 0, std::nullopt},
 };
 constexpr std::size_t kCount = std::size(kColumns);
