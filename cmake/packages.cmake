@@ -99,6 +99,7 @@ install(FILES ${PROJECT_SOURCE_DIR}/docs/workload.schema.json ${PROJECT_SOURCE_D
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/workloads ${PROJECT_SOURCE_DIR}/experiments ${PROJECT_SOURCE_DIR}/examples/robot
   DESTINATION ${CMAKE_INSTALL_DATADIR}/redag COMPONENT redag_tools FILES_MATCHING PATTERN "*.yaml")
 file(GLOB examples CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/examples/*.cpp)
+list(FILTER examples EXCLUDE REGEX workload)  # needs the workbench, which is not installed
 install(FILES ${examples} DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/libredag-dev/examples COMPONENT libredag_dev)
 
 # The date of the last commit, unless the caller states another: the same sources make the same packages.
