@@ -60,29 +60,46 @@ function(redag_package component name section synopsis description)
     DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${name} COMPONENT ${component})
 endfunction()
 
+# The libraries and the program share internal interfaces: each package needs the others of exactly its version. For
+# libraries of this build dpkg-shlibdeps states nothing. Lines of a description have at most 79 characters.
 redag_package(libredag libredag${soname_version} libs
   "Rate-priority executor for many callback DAGs (library)"
-  "ReDAG-RT runs the callbacks of many DAGs in one process. The ready callback with the highest rate runs first, and\npreempts where the platform allows it. This package has the shared library.")
+"ReDAG-RT runs the callbacks of many DAGs in one process. The ready callback
+with the highest rate runs first, and preempts where the platform allows it.
+This package has the shared library.")
 redag_package(libredag_dev libredag-dev libdevel
   "Rate-priority executor for many callback DAGs (development)"
-  "ReDAG-RT runs the callbacks of many DAGs in one process. This package has the headers, and what CMake and pkg-config\nneed to build programs with the library."
+"ReDAG-RT runs the callbacks of many DAGs in one process. This package has the
+headers, and what CMake and pkg-config need to build programs with the library."
   "libredag${soname_version} ${this_version}" libexpected-dev)
 redag_package(libredag_analysis libredag-analysis${soname_version} libs
   "Response-time analysis and simulator of ReDAG-RT (library)"
-  "This package has bounds on response times of callback DAGs, a simulator of their executors and a checker of recorded\ntraces, as a shared library.")
+"This package has bounds on response times of callback DAGs, a simulator of
+their executors and a checker of recorded traces, as a shared library."
+  "libredag${soname_version} ${this_version}")
 redag_package(libredag_analysis_dev libredag-analysis-dev libdevel
   "Response-time analysis and simulator of ReDAG-RT (development)"
-  "This package has headers and CMake files of the analysis of callback DAGs. Its interface may change with each minor\nversion."
+"This package has headers and CMake files of the analysis of callback DAGs. Its
+interface may change with each minor version."
   "libredag-analysis${soname_version} ${this_version}" "libredag-dev ${this_version}")
 redag_package(redag_tools redag-tools devel
   "Program that simulates, runs, analyses and compares callback DAGs"
-  "The program redag validates workloads of callback DAGs, runs them in virtual time or on threads, bounds response times,\ncompares executors and explains missed deadlines. Manual pages, completions of bash, zsh and fish, workloads and the\nschema of workloads are included.")
+"The program redag validates workloads of callback DAGs, runs them in virtual
+time or on threads, bounds response times, compares executors and explains
+missed deadlines. Manual pages, completions of bash, zsh and fish, workloads,
+robots and their schemas are included."
+  "libredag${soname_version} ${this_version}" "libredag-analysis${soname_version} ${this_version}")
+# CPack's own scripts call ldconfig. Policy 8.1.1 asks for this trigger.
+foreach(library IN ITEMS LIBREDAG LIBREDAG_ANALYSIS)
+  set(CPACK_DEBIAN_${library}_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/cmake/debian/triggers)
+endforeach()
 
-install(FILES ${PROJECT_SOURCE_DIR}/docs/workload.schema.json
+install(FILES ${PROJECT_SOURCE_DIR}/docs/workload.schema.json ${PROJECT_SOURCE_DIR}/docs/robot.schema.json
   DESTINATION ${CMAKE_INSTALL_DATADIR}/redag COMPONENT redag_tools)
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/workloads ${PROJECT_SOURCE_DIR}/experiments
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/workloads ${PROJECT_SOURCE_DIR}/experiments ${PROJECT_SOURCE_DIR}/examples/robot
   DESTINATION ${CMAKE_INSTALL_DATADIR}/redag COMPONENT redag_tools FILES_MATCHING PATTERN "*.yaml")
 file(GLOB examples CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/examples/*.cpp)
+list(FILTER examples EXCLUDE REGEX workload)  # needs the workbench, which is not installed
 install(FILES ${examples} DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/libredag-dev/examples COMPONENT libredag_dev)
 
 # The date of the last commit, unless the caller states another: the same sources make the same packages.

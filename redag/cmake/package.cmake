@@ -32,7 +32,8 @@ endfunction()
 function(redag_add_library target)
   redag_sources(sources ${ARGN})
   add_library(${target} ${sources})
-  set_target_properties(${target} PROPERTIES
+  # Without DEFINE_SYMBOL, objects of shared and static libraries are the same, and ccache serves both.
+  set_target_properties(${target} PROPERTIES DEFINE_SYMBOL ""
     VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
   target_include_directories(${target} PUBLIC
     $<BUILD_INTERFACE:${redag_include_root}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)

@@ -137,10 +137,12 @@ TEST(LiveGraphs, AHistogramSharesItsAxis) {
   EXPECT_EQ(plain(histogram(frame.tasks[0].spread.all, axis, 0, 8, {})), "\u2584\u2584  \u2588\u2588");
   EXPECT_EQ(plain(histogram(frame.tasks[1].spread.all, axis, 0, 4, {.ascii = true})), "   #");
   const Line late = histogram(frame.tasks[0].spread.all, axis, 60 * kMicrosecond, 4, {});
-  ASSERT_EQ(late.size(), 2U);
+  ASSERT_EQ(late.size(), 3U);
   EXPECT_EQ(late[0].text, "\u2584 ");
   EXPECT_EQ(late[0].tint, Tint::Plain);
+  EXPECT_EQ(late[1].text, "\u2588");
   EXPECT_EQ(late[1].tint, Tint::Bad);
+  EXPECT_EQ(late[2].tint, Tint::Plain);  // a blank beyond the deadline
   EXPECT_EQ(axis_text(axis, 16), "33us       130us");
   EXPECT_EQ(axis_text(axis, 8), "33us    ");
 }

@@ -100,7 +100,9 @@ Line histogram(const std::uint32_t (&counts)[kClasses], const TimeAxis &axis, Du
   const std::uint64_t most = *std::max_element(sums.begin(), sums.end());
   for (std::size_t column = 0; column < width; ++column) {
     const double share = most > 0 ? static_cast<double>(sums[column]) / static_cast<double>(most) : 0;
-    const bool is_late = deadline > 0 && live::page::least_in(axis.class_of(column, width)) >= deadline;
+    // A blank stays plain: in the marked row, whose colours are reversed, it would be a red block.
+    const bool is_late =
+        sums[column] > 0 && deadline > 0 && live::page::least_in(axis.class_of(column, width)) >= deadline;
     put(line, glyphs.column(height_of(share)), is_late ? Tint::Bad : Tint::Plain);
   }
   return line;
