@@ -24,7 +24,7 @@ class Record(Case):
         folder = self.folder / "deep" / "robot"
         self.expect(self.record(folder), 0)
         self.assertEqual([path.name for path in folder.iterdir()], ["events.jsonl"])
-        self.assertIn("control.pid", self.expect(redag("why", folder), 0).stdout)
+        self.assertIn("deadline", self.expect(redag("why", folder), 0).stdout)
         checked = json.loads(self.expect(redag("check-trace", "--json", folder), 0).stdout)
         self.assertTrue(checked, "the checker finds nothing wrong, and says so")
         self.expect(redag("report", folder), 0)
@@ -41,7 +41,7 @@ class Record(Case):
         self.assertEqual(process.returncode, -signal.SIGKILL)
         self.expect(redag("recover", folder), 0)
         self.expect(redag("check-trace", folder), 0)
-        self.assertIn("control.pid", self.expect(redag("why", folder), 0).stdout)
+        self.assertIn("deadline", self.expect(redag("why", folder), 0).stdout)
 
     def test_a_folder_that_cannot_be_written_is_named(self):
         (self.folder / "file").write_text("")
