@@ -12,7 +12,7 @@
 #define REDAG_LTTNG_TRACEPOINTS_H
 
 #include <lttng/tracepoint.h>
-#include <stdint.h>
+#include <stdint.h>  // NOLINT(modernize-deprecated-headers): a header of C
 
 // clang-format off
 LTTNG_UST_TRACEPOINT_EVENT_CLASS(redag, job_event,

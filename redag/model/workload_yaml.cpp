@@ -490,8 +490,8 @@ class Reader : private yaml::ValueReader {
     if (finding.item == Finding::kNone) return *value;
     if (finding.field == Field::Clusters) return value->children[finding.item];
     // A map of keys and values; waits stand between cpu segments.
-    if (finding.field == Field::Devices) return value->children[2 * finding.item];
-    if (finding.field == Field::Segments) return value->children[2 * finding.item + 1];
+    if (finding.field == Field::Devices) return value->children[std::size_t{2} * finding.item];
+    if (finding.field == Field::Segments) return value->children[std::size_t{2} * finding.item + 1];
     if (finding.field == Field::After) return *dags_[finding.dag.value].tasks[finding.task].edges[finding.item];
     if (finding.field == Field::Callback) {
       const Callback &callback = *workload_.dags[finding.dag.value].tasks[finding.task].callback;

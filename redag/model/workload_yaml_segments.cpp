@@ -137,6 +137,7 @@ std::optional<Wait> ValueReader::wait_segment(const Node &node, const std::vecto
   const auto found = std::find_if(devices.begin(), devices.end(), [&](const Device &one) { return one.name == *name; });
   if (found == devices.end()) {
     std::vector<std::string_view> names;
+    names.reserve(devices.size());
     for (const Device &one : devices) names.emplace_back(one.name);
     error(*device, fmt::format("there is no device {}", describe(*device)),
           did_you_mean(*name, names, "add it to the platform: 'devices: {name: {slots: 1}}'"));
