@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <map>
+#include <numeric>
 #include <tuple>
 #include <utility>
 
@@ -156,9 +157,38 @@ std::vector<Explanation> Investigation::explain(std::span<const Subject> subject
   return explanations;
 }
 
-std::vector<Culprit> culprits_of(const Explanation &explanation) {
+Duration PartRow::length() const {
+  return std::accumulate(parts.begin(), parts.end(), Duration{0},
+                         [](Duration sum, const Part &part) { return sum + part.length; });
+}
+
+bool PartRow::is_work() const {
+  return std::all_of(parts.begin(), parts.end(), [](const Part &part) { return metrics::is_work(part.cause); });
+}
+
+std::vector<PartRow> rows_of(std::span<const Part> parts, std::size_t most) {
+  // Between n parts that stand alone, before them and after them there are up to n + 1 rows of other parts.
+  const std::size_t alone = parts.size() <= most ? parts.size() : (most - 1) / 2;
+  std::vector<std::size_t> longest(parts.size());
+  std::iota(longest.begin(), longest.end(), std::size_t{0});
+  std::stable_sort(longest.begin(), longest.end(),
+                   [&](std::size_t a, std::size_t b) { return parts[a].length > parts[b].length; });
+  longest.resize(alone);
+  std::sort(longest.begin(), longest.end());
+  std::vector<PartRow> rows;
+  std::size_t done = 0;
+  for (const std::size_t i : longest) {
+    if (done < i) rows.push_back({parts.subspan(done, i - done)});
+    rows.push_back({parts.subspan(i, 1)});
+    done = i + 1;
+  }
+  if (done < parts.size()) rows.push_back({parts.subspan(done)});
+  return rows;
+}
+
+std::vector<Culprit> culprits_of(std::span<const Part> parts) {
   std::map<CulpritKey, Culprit> found;
-  for (const Part &part : explanation.parts) {
+  for (const Part &part : parts) {
     const CulpritKey key = culprit_key(part);
     Culprit &culprit = found[key];
     std::tie(culprit.cause, culprit.task, culprit.program) = key;
@@ -173,7 +203,7 @@ std::vector<Culprit> culprits_of(const Explanation &explanation) {
 std::vector<Culprit> culprits_of(std::span<const Explanation> explanations) {
   std::map<CulpritKey, Culprit> found;
   for (const Explanation &explanation : explanations) {
-    for (const Culprit &one : culprits_of(explanation)) {
+    for (const Culprit &one : culprits_of(explanation.parts)) {
       Culprit &culprit = found[{one.cause, one.task, one.program}];
       std::tie(culprit.cause, culprit.task, culprit.program) = std::tie(one.cause, one.task, one.program);
       culprit.jobs += one.jobs;

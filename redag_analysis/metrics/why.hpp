@@ -54,6 +54,20 @@ struct Culprit {
   friend bool operator==(const Culprit &, const Culprit &) = default;
 };
 
+/// A row of a list of parts: one part, or consecutive ones together.
+struct PartRow {
+  std::span<const Part> parts;
+
+  [[nodiscard]] Time begin() const { return parts.front().begin; }
+  [[nodiscard]] Duration length() const;
+  /// True if all of its parts are work.
+  [[nodiscard]] bool is_work() const;
+};
+
+/// Returns a job's parts, earliest first, in at most `most` rows (at least 3). If there are more parts, the longest ones
+/// have rows of their own, and those between them have one together. The rows refer to `parts`.
+[[nodiscard]] std::vector<PartRow> rows_of(std::span<const Part> parts, std::size_t most);
+
 class Investigation {
  public:
   /// `trace` and `kernel` (null: there is none) must outlive this object.
@@ -87,9 +101,9 @@ class Investigation {
   std::optional<KernelView> kernel_;
 };
 
-/// The culprits of one job: parts of one cause and one task or program together, the largest first. Work (is_work())
-/// comes last.
-[[nodiscard]] std::vector<Culprit> culprits_of(const Explanation &explanation);
+/// The culprits of one job's parts: parts of one cause and one task or program together, the largest first. Work
+/// (is_work()) comes last.
+[[nodiscard]] std::vector<Culprit> culprits_of(std::span<const Part> parts);
 
 /// The culprits of several jobs together, those that delayed most jobs most first.
 [[nodiscard]] std::vector<Culprit> culprits_of(std::span<const Explanation> explanations);

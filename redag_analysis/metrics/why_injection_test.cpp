@@ -233,7 +233,7 @@ std::string named(const Injection &injection, std::uint64_t seed, std::string &a
     for (const Part &part : one.parts) {
       all += std::to_string(part.length) + " " + describe(part, trace.info.workload, {job.task, job.number}) + "\n";
     }
-    const Culprit main = culprits_of(one).front();
+    const Culprit main = culprits_of(one.parts).front();
     return std::string(to_string(main.cause)) + " " +
            (main.task.valid() ? trace::task_name(trace.info.workload, main.task) : "");
   }

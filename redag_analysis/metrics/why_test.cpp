@@ -3,6 +3,7 @@
 
 #include "redag_analysis/metrics/why.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
@@ -190,6 +191,56 @@ TEST(Why, AWaitIsNoDelayAndTheQueueOfADeviceIsOne) {
       EXPECT_NE(to_text(trace, one).find("its device served b.lo#0"), std::string::npos) << to_text(trace, one);
     }
   }
+}
+
+// Parts of job d.a#0, all of them queued behind job d.b#7.
+std::vector<Part> parts_of_lengths(const std::vector<std::uint16_t> &lengths) {
+  Part part;
+  part.cause = Cause::Queued;
+  part.job = {TaskId(0), 0};
+  part.by = {TaskId(1), 7};
+  std::vector<Part> parts;
+  for (const std::uint16_t length : lengths) {
+    part.length = length;
+    parts.push_back(part);
+  }
+  return parts;
+}
+
+TEST(Why, ManyPartsAreFewRows) {
+  const std::vector<Part> parts = parts_of_lengths({1, 50, 2, 3, 60, 4, 5});
+  const Workload workload = make_workload({make_dag("d", {{.name = "a"}, {.name = "b", .period = 10}})});
+  std::string text;
+  for (const PartRow &row : rows_of(parts, 5)) {
+    text += fmt::format("{}: {}\n", row.length(), describe(row, workload, {TaskId(0), 0}));
+  }
+  EXPECT_EQ(text,
+            "1: queued behind d.b#7 (100 Hz)\n"
+            "50: queued behind d.b#7 (100 Hz)\n"
+            "5: 2 shorter parts, mainly queued behind d.b (5ns)\n"
+            "60: queued behind d.b#7 (100 Hz)\n"
+            "9: 2 shorter parts, mainly queued behind d.b (9ns)\n");
+  EXPECT_EQ(rows_of(parts, 7).size(), 7U);
+  EXPECT_TRUE(rows_of({}, 3).empty());
+}
+
+RC_GTEST_PROP(Why, RowsHoldEachPartOnceAndInOrder, (std::vector<std::uint16_t> lengths, std::uint8_t spare)) {
+  const std::vector<Part> parts = parts_of_lengths(lengths);
+  const std::size_t most = std::size_t{3} + spare;
+  const std::vector<PartRow> rows = rows_of(parts, most);
+  RC_ASSERT(rows.size() <= most);
+  std::vector<Part> all;
+  Duration longest_together = 0;
+  for (const PartRow &row : rows) {
+    all.insert(all.end(), row.parts.begin(), row.parts.end());
+    if (row.parts.size() == 1) continue;
+    for (const Part &part : row.parts) longest_together = std::max(longest_together, part.length);
+  }
+  RC_ASSERT(all == parts);
+  // No part that shares a row is longer than one that has its own.
+  std::vector<std::uint16_t> sorted = lengths;
+  std::sort(sorted.rbegin(), sorted.rend());
+  if (longest_together > 0) RC_ASSERT(longest_together <= sorted[(most - 1) / 2 - 1]);
 }
 
 TEST(Why, FollowsTheDataBackToTheSource) {

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "redag/base/text.hpp"
 #include "redag/trace/trace.hpp"
 
 namespace redag::metrics {
@@ -74,6 +75,13 @@ std::string describe(const Part &part, const Workload &workload, const JobId &ex
   const bool names_it = part.cause == Cause::Predecessor && part.by == part.job;
   if (part.job == explained || names_it) return text;
   return fmt::format("{}: {}", job_name(workload, part.job), text);
+}
+
+std::string describe(const PartRow &row, const Workload &workload, const JobId &explained) {
+  if (row.parts.size() == 1) return describe(row.parts.front(), workload, explained);
+  const Culprit main = culprits_of(row.parts).front();
+  return fmt::format("{} shorter parts, mainly {} ({})", format_count(row.parts.size()), describe(main, workload),
+                     humanize_duration(main.time));
 }
 
 std::string describe(const Culprit &culprit, const Workload &workload) {

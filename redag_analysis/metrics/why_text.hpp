@@ -17,6 +17,9 @@ namespace redag::metrics {
 /// For example "queued behind perception.detect#3 (10 Hz)". Says whose time it was if not that of `explained`.
 [[nodiscard]] std::string describe(const Part &part, const Workload &workload, const JobId &explained);
 
+/// As above; of several parts for example "63 shorter parts, mainly queued behind perception.detect (1.2ms)".
+[[nodiscard]] std::string describe(const PartRow &row, const Workload &workload, const JobId &explained);
+
 /// For example "queued behind perception.detect".
 [[nodiscard]] std::string describe(const Culprit &culprit, const Workload &workload);
 

@@ -20,16 +20,17 @@ constexpr std::size_t kWorst = 100;      // misses whose parts are shown
 constexpr std::size_t kMostShown = 400;  // with those in the schedule
 constexpr std::size_t kClosest = 20;     // jobs that are shown without a miss
 constexpr std::size_t kMostCauses = 40;
+constexpr std::size_t kMostRows = 40;  // of parts of a job
 
 Json to_json(const metrics::Explanation &one, const Workload &workload) {
   const metrics::JobId id{one.job.task, one.job.number};
   Json parts{
       {"begin_ns", Json::array()}, {"length_ns", Json::array()}, {"work", Json::array()}, {"text", Json::array()}};
-  for (const metrics::Part &part : one.parts) {
-    parts["begin_ns"].push_back(part.begin == kNever ? Json() : Json(part.begin - one.begin));
-    parts["length_ns"].push_back(part.length);
-    parts["work"].push_back(metrics::is_work(part.cause) ? 1 : 0);
-    parts["text"].push_back(metrics::describe(part, workload, id));
+  for (const metrics::PartRow &row : metrics::rows_of(one.parts, kMostRows)) {
+    parts["begin_ns"].push_back(row.begin() == kNever ? Json() : Json(row.begin() - one.begin));
+    parts["length_ns"].push_back(row.length());
+    parts["work"].push_back(row.is_work() ? 1 : 0);
+    parts["text"].push_back(metrics::describe(row, workload, id));
   }
   return {{"task", id.task.value},        {"number", id.number},       {"missed", one.miss != metrics::Miss::None},
           {"end_to_end", one.end_to_end}, {"length_ns", one.length()}, {"text", metrics::headline(one, workload)},
@@ -39,7 +40,7 @@ Json to_json(const metrics::Explanation &one, const Workload &workload) {
 WorstJob row_of(const metrics::Explanation &one, const trace::RunInfo &run) {
   WorstJob row{.job = one.job, .since = one.job.release - run.start, .lateness = {}, .main_cause = {}};
   if (one.miss != metrics::Miss::Lost) row.lateness = one.lateness();
-  const std::vector<metrics::Culprit> culprits = metrics::culprits_of(one);
+  const std::vector<metrics::Culprit> culprits = metrics::culprits_of(one.parts);
   if (!culprits.empty()) row.main_cause = culprits.front();
   return row;
 }

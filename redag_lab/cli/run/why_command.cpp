@@ -20,6 +20,7 @@ namespace {
 
 constexpr std::size_t kMostExplained = 100'000;
 constexpr std::size_t kRows = 20;
+constexpr std::size_t kParts = 40;
 constexpr std::size_t kClosest = 5;  // explained where no deadline was missed
 
 struct WhyOptions {
@@ -102,7 +103,7 @@ class Explaining {
     if (options_.json) {
       console_.print(to_text(to_json(overview, investigation.run())));
     } else {
-      console_.say(describe(one, investigation.run(), console_.out_traits()));
+      console_.say(describe(one, investigation.run(), console_.out_traits(), options_.all ? 0 : kParts));
     }
     return kExitOk;
   }
@@ -165,7 +166,7 @@ Action add_why(CLI::App &app) {
   app.add_flag("--end-to-end", options->end_to_end,
                "Explain the time since the release of the source whose data the job carries")
       ->needs(job);
-  app.add_flag("--all", options->all, "Show every miss, however many there are")->excludes(job);
+  app.add_flag("--all", options->all, "Show every miss, or every part of JOB, however many there are");
   app.add_flag("--json", options->json, "Write one JSON document, and nothing else, to standard output");
   return [options](Console &console) { return Explaining(*options, console).run(); };
 }

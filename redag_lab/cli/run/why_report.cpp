@@ -97,24 +97,26 @@ Json to_json(const Explanation &one, const trace::RunInfo &run) {
 
 }  // namespace
 
-std::string describe(const Explanation &one, const trace::RunInfo &run, const StreamTraits &terminal) {
+std::string describe(const Explanation &one, const trace::RunInfo &run, const StreamTraits &terminal,
+                     std::size_t most) {
   std::string text = tinted(metrics::headline(one, run.workload), tint_of(one), terminal.colour) + "\n\n";
   text += fmt::format("{:>10}  {:>15}  {:>7}  what happened\n", one.end_to_end ? "origin +" : "release +",
                       "nanoseconds", "share");
-  for (const Part &part : one.parts) {
-    text += line(part.begin == kNever ? "" : humanize_duration(part.begin - one.begin), part.length, one.length(),
-                 metrics::describe(part, run.workload, id_of(one)), terminal);
+  for (const metrics::PartRow &row : metrics::rows_of(one.parts, most == 0 ? one.parts.size() : most)) {
+    text += line(row.begin() == kNever ? "" : humanize_duration(row.begin() - one.begin), row.length(), one.length(),
+                 metrics::describe(row, run.workload, id_of(one)), terminal);
   }
   const char *whole = one.job.outcome != metrics::JobOutcome::Finished ? "until it ended, or the run did"
                       : one.end_to_end                                 ? "end to end"
                                                                        : "response time";
   text += line("", one.length(), one.length(), whole, terminal);
-  const std::vector<Culprit> culprits = metrics::culprits_of(one);
+  const std::vector<Culprit> culprits = metrics::culprits_of(one.parts);
   if (!culprits.empty() && !metrics::is_work(culprits.front().cause)) {
     text += "\n" + wrapped(fmt::format("Main cause: {} ({} of {})", metrics::describe(culprits.front(), run.workload),
                                        humanize_duration(culprits.front().time), humanize_duration(one.length())),
                            0, terminal.width);
   }
+  if (most > 0 && one.parts.size() > most) text += "(the longest parts; --all shows all)\n";
   return text;
 }
 
@@ -135,7 +137,7 @@ std::string describe(const WhyOverview &overview, const trace::RunInfo &run, con
                {"share", true, 6}});
   for (std::size_t i = 0; i < count && (most == 0 || i < most); ++i) {
     const Explanation &one = overview.explanations[i];
-    const std::vector<Culprit> culprits = metrics::culprits_of(one);
+    const std::vector<Culprit> culprits = metrics::culprits_of(one.parts);
     table.add({{metrics::job_name(run.workload, id_of(one))},
                {lateness(one), tint_of(one)},
                {culprits.empty() ? "lost at its release" : metrics::describe(culprits.front(), run.workload)},

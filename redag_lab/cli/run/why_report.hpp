@@ -21,9 +21,9 @@ struct WhyOverview {
   std::size_t jobs = 0;                            // released, those of the warm-up left out
 };
 
-/// Returns one job's parts, a line each, and what they sum to.
+/// Returns one job's parts in `most` lines (0: one for each part), and what they sum to.
 [[nodiscard]] std::string describe(const metrics::Explanation &explanation, const trace::RunInfo &run,
-                                   const StreamTraits &terminal);
+                                   const StreamTraits &terminal, std::size_t most);
 
 /// Returns the causes of a whole run and a table of its misses, of which `most` rows are shown (0: all).
 [[nodiscard]] std::string describe(const WhyOverview &overview, const trace::RunInfo &run, const StreamTraits &terminal,
