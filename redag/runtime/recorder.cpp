@@ -109,7 +109,7 @@ Result<void> Recorder::finish(Time end) {
 Result<void> Recorder::write_trace(Time end) {
   Result<trace::Recovered> recovered = trace::recover(flight(), end);
   if (!recovered) return tl::unexpected<Diagnostics>(std::move(recovered.error()));
-  return trace::write_trace(folder_ + "/events.jsonl", recovered->trace).and_then([this] {
+  return trace::write_trace(folder_ + "/" + std::string(trace::kEventsFile), recovered->trace).and_then([this] {
     return trace::remove_flight_record(flight());
   });
 }

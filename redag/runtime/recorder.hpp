@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Records the run of an engine into a folder: to a flight record while it lasts, which becomes events.jsonl at the end
+// Records the run of an engine into a folder: to a flight record while it lasts, which becomes events.redag at the end
 // (docs/results_format.md). Owns a thread of normal priority, which takes the engine's events ten times a second.
 #pragma once
 
@@ -37,7 +37,7 @@ class Recorder {
   /// Starts the record, and the thread. `engine` must live until finish() or the destructor. If there is a thread
   /// already, does nothing. Error: the record cannot be written, or there can be no thread.
   [[nodiscard]] Result<void> start(Engine &engine, Describe describe, const std::string &name);
-  /// Once the engine's threads have ended: writes events.jsonl of a run that ended at `end`. Error: what could not be
+  /// Once the engine's threads have ended: writes events.redag of a run that ended at `end`. Error: what could not be
   /// written, now or before; the flight record is then left for `redag recover`.
   [[nodiscard]] Result<void> finish(Time end);
 

@@ -45,7 +45,7 @@ class Record : public ::testing::Test {
     return options;
   }
   [[nodiscard]] trace::Trace trace() const {
-    Result<trace::Trace> read = trace::read_trace((folder_ / "events.jsonl").string());
+    Result<trace::Trace> read = trace::read_trace((folder_ / "events.redag").string());
     if (!read) throw std::runtime_error(to_string(read.error()));
     return *std::move(read);
   }
@@ -72,7 +72,7 @@ TEST_F(Record, ARunBecomesATraceThatTheCheckerAccepts) {
       const DagId dag = executor.add(std::move(control));
       executor.run();
       finished = executor.stats(dag)[2].jobs.finished;
-      EXPECT_TRUE(fs::exists(folder_ / "events.jsonl")) << "written when run() returns";
+      EXPECT_TRUE(fs::exists(folder_ / "events.redag")) << "written when run() returns";
       EXPECT_FALSE(fs::exists(folder_ / "flight"));
     }
     const trace::Trace recorded = trace();

@@ -23,7 +23,7 @@ class Record(Case):
     def test_the_tools_read_a_record(self):
         folder = self.folder / "deep" / "robot"
         self.expect(self.record(folder), 0)
-        self.assertEqual([path.name for path in folder.iterdir()], ["events.jsonl"])
+        self.assertEqual([path.name for path in folder.iterdir()], ["events.redag"])
         self.assertIn("deadline", self.expect(redag("why", folder), 0).stdout)
         checked = json.loads(self.expect(redag("check-trace", "--json", folder), 0).stdout)
         self.assertTrue(checked, "the checker finds nothing wrong, and says so")
