@@ -22,6 +22,8 @@ struct Overheads {
   Duration release = 0;   // handling a release: added to the released job's demand
   Duration dispatch = 0;  // starting a job: spent on its worker before the body
   Duration preempt = 0;   // each resumption after a preemption or a wait: spent on the worker before the job continues
+
+  friend bool operator==(const Overheads &, const Overheads &) = default;
 };
 
 /// A machine's overheads, as far as the simulator has them: it knows no stalls and no late releases.

@@ -55,7 +55,7 @@ Order order_of(const Robot &robot, std::uint32_t levels) {
     std::optional<std::uint32_t> level;
     if (threads.level && threads.level->kind == Level::Kind::Rate) level = (next++)->level;
     if (threads.level && threads.level->kind == Level::Kind::Task) {
-      level = order.of_task[threads.level->process][threads.level->task.value];
+      level = order.of_task[threads.level->task.process][threads.level->task.task.value];
     }
     order.of_threads.push_back(level);
   }

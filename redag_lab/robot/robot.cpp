@@ -9,8 +9,8 @@ namespace redag::robot {
 
 bool is_of_threads(const Robot &robot, std::size_t process, TaskId task) {
   return std::any_of(robot.threads.begin(), robot.threads.end(), [&](const Threads &threads) {
-    return threads.level && threads.level->kind == Level::Kind::Task && threads.level->process == process &&
-           threads.level->task == task;
+    return threads.level && threads.level->kind == Level::Kind::Task && threads.level->task.process == process &&
+           threads.level->task.task == task;
   });
 }
 

@@ -48,6 +48,21 @@ struct Process {
   Place place;
 };
 
+/// A task of a process.
+struct TaskOf {
+  std::size_t process = 0;  // position in Robot::processes
+  TaskId task = {};         // in the process's workload
+  std::string name;         // "process.dag.task"
+};
+
+/// Data that cross from one process to another: each job of `from` that ends releases one of `to`.
+struct Link {
+  TaskOf from;
+  TaskOf to;               // a timer task without predecessors, of the same period
+  Duration transport = 0;  // the longest time from the end of `from` to the release of `to`
+  Place place;
+};
+
 /// Where threads belong in the order.
 struct Level {
   enum class Kind : std::uint8_t {
@@ -59,8 +74,7 @@ struct Level {
     Nice,   // ordinary threads with nice `value`
   };
   Kind kind = Kind::Nice;
-  std::size_t process = 0;  // Task: position in Robot::processes
-  TaskId task = {};         // Task: in the process's workload
+  TaskOf task = {};  // Task
   Duration rate = 0;
   int value = 0;
 
@@ -97,6 +111,7 @@ struct Robot {
   PolicyKind policy = PolicyKind::RateMonotonic;
   std::vector<CpuSet> cpu_sets;  // at least one
   std::vector<Process> processes;
+  std::vector<Link> links;
   std::vector<Threads> threads;
   std::vector<Interrupts> interrupts;
 };

@@ -10,7 +10,6 @@
 #include <filesystem>
 #include <iterator>
 #include <span>
-#include <tuple>
 #include <unordered_map>
 #include <unordered_set>
 #include <utility>
@@ -39,12 +38,13 @@ class RobotReader : private yaml::ValueReader {
       : ValueReader(file), root_(root), options_(options) {}
 
   Result<LoadedRobot> run() {
-    if (check_map(root_, "a robot", {"robot", "policy", "cpus", "cpu_sets", "processes", "threads", "irqs"})) {
+    if (check_map(root_, "a robot", {"robot", "policy", "cpus", "cpu_sets", "processes", "links", "threads", "irqs"})) {
       take(root_, "robot", robot_.name, [this](const Node &node, auto key) { return text(node, key); });
       take(root_, "policy", robot_.policy,
            [this](const Node &node, auto key) { return one_of(node, key, std::span<const PolicyKind>(kPolicies)); });
       read_cpu_sets();
       read_list("processes", names_of_processes_, [this](const Node &node) { read_process(node); });
+      read_list("links", targets_, [this](const Node &node) { read_link(node); });
       read_list("threads", names_of_threads_, [this](const Node &node) { read_threads(node); });
       read_list("irqs", names_of_interrupts_, [this](const Node &node) { read_interrupts(node); });
       if (robot_.processes.empty() && !is_broken_) {
@@ -274,6 +274,58 @@ class RobotReader : private yaml::ValueReader {
         Diagnostic{Severity::Warning, file_, at.line, at.column, std::move(message), std::move(hint)});
   }
 
+  void read_link(const Node &node) {
+    Link link;
+    link.place = place_of(node);
+    if (!check_map(node, "a link", {"from", "to", "transport"})) return;
+    for (const char *key : {"from", "to", "transport"}) {
+      if (find(node, key) != nullptr) continue;
+      error(node, fmt::format("the link has no '{}'", key),
+            "write {from: PROCESS.DAG.TASK, to: PROCESS.DAG.TASK, transport: TIME}");
+      return;
+    }
+    const auto task = [this](const Node &at, auto key) { return read_task(at, key); };
+    const bool is_read =
+        take(node, "from", link.from, task) && take(node, "to", link.to, task) &&
+        take(node, "transport", link.transport, [this](const Node &at, auto key) { return duration(at, key); });
+    if (!is_read) return;
+    if (!check_link(node, link)) return;
+    robot_.links.push_back(std::move(link));
+  }
+
+  bool check_link(const Node &node, const Link &link) {
+    const Task &from = task_of(link.from);
+    const Task &to = task_of(link.to);
+    const auto refuse = [&](const char *key, std::string message, std::string hint) {
+      error(*find(node, key), std::move(message), std::move(hint));
+      return false;
+    };
+    if (link.from.process == link.to.process) {
+      return refuse("to", "the link stays within a process", "write an edge in its workload: 'after:'");
+    }
+    if (to.activation != Activation::Timer || !to.predecessors.empty()) {
+      return refuse("to", fmt::format("task '{}' has predecessors in its process", link.to.name),
+                    "add a task without predecessors that receives the data");
+    }
+    if (!targets_.emplace(link.to.name, robot_.links.size()).second) {
+      return refuse("to", fmt::format("task '{}' has the data of another link already", link.to.name),
+                    "add a task for the data of each");
+    }
+    if (to.jitter != 0) {
+      return refuse("to", fmt::format("task '{}' has a jitter, which would follow from the link", link.to.name),
+                    "remove 'jitter:' in its workload");
+    }
+    if (from.period == to.period) return true;
+    return refuse("to",
+                  fmt::format("task '{}' has the period {}, and '{}', whose data release it, has {}", link.to.name,
+                              format_duration(to.period), link.from.name, format_duration(from.period)),
+                  fmt::format("write 'period: {}' in its workload", format_duration(from.period)));
+  }
+
+  [[nodiscard]] const Task &task_of(const TaskOf &task) const {
+    return *flatten(*robot_.processes[task.process].workload)[task.task.value].task;
+  }
+
   void read_threads(const Node &node) {
     Threads threads;
     threads.place = place_of(node);
@@ -345,7 +397,12 @@ class RobotReader : private yaml::ValueReader {
     }
     const Node &value = node.children[1];
     bool is_read = false;
-    if (find(node, "task") != nullptr) return read_task(value);
+    if (find(node, "task") != nullptr) {
+      level.kind = Level::Kind::Task;
+      return take(node, "task", level.task, [this](const Node &at, auto key) { return read_task(at, key); })
+                 ? std::optional(level)
+                 : std::nullopt;
+    }
     if (find(node, "rate") != nullptr) {
       level.kind = Level::Kind::Rate;
       is_read = take(node, "rate", level.rate, [this](const Node &at, auto key) { return positive_duration(at, key); });
@@ -364,8 +421,8 @@ class RobotReader : private yaml::ValueReader {
   }
 
   // Finds "process.dag.task". Any of the names can contain dots.
-  std::optional<Level> read_task(const Node &node) {
-    const std::optional<std::string> name = text(node, "task");
+  std::optional<TaskOf> read_task(const Node &node, std::string_view key) {
+    const std::optional<std::string> name = text(node, key);
     if (!name || is_broken_) return std::nullopt;
     if (tasks_.empty()) {
       for (std::size_t p = 0; p < robot_.processes.size(); ++p) {
@@ -378,12 +435,7 @@ class RobotReader : private yaml::ValueReader {
       }
     }
     const auto found = tasks_.find(*name);
-    if (found != tasks_.end()) {
-      Level level;
-      level.kind = Level::Kind::Task;
-      std::tie(level.process, level.task) = found->second;
-      return level;
-    }
+    if (found != tasks_.end()) return TaskOf{found->second.first, found->second.second, *name};
     std::vector<std::string_view> names;
     for (const auto &[each, place] : tasks_) names.emplace_back(each);
     std::sort(names.begin(), names.end());
@@ -434,6 +486,7 @@ class RobotReader : private yaml::ValueReader {
   bool is_broken_ = false;
   Names names_of_sets_;
   Names names_of_processes_;
+  Names targets_;  // of links
   Names names_of_threads_;
   Names names_of_interrupts_;
   std::unordered_set<int> owned_;  // processors of CPU sets

@@ -68,8 +68,8 @@ irqs:
   ASSERT_EQ(robot.threads.size(), 6u);
   EXPECT_EQ(robot.threads[0].process, 1u);
   EXPECT_EQ(robot.threads[0].level->kind, Level::Kind::Task);
-  EXPECT_EQ(robot.threads[0].level->process, 0u);
-  EXPECT_EQ(robot.threads[0].level->task, TaskId(0));
+  EXPECT_EQ(robot.threads[0].level->task.process, 0u);
+  EXPECT_EQ(robot.threads[0].level->task.task, TaskId(0));
   EXPECT_EQ(robot.threads[1].period, 20 * kMillisecond);
   EXPECT_EQ(robot.threads[1].count, 2u);
   EXPECT_EQ(robot.threads[1].cpus, (std::vector<int>{0, 1}));
@@ -114,6 +114,54 @@ TEST(RobotYaml, SuggestsTasksAndProcesses) {
             "cart.yaml:17:32: error: there is no process 'bass' (did you mean 'base'?)");
 }
 
+std::string with_link(const std::string &link, const std::string &tasks) {
+  return "robot: cart\ncpus: 0\nprocesses:\n"
+         "  - {name: a, match: {name: a}, workload: {dags: [{name: d, tasks: [{name: s, wcet: 1ms, period: 9ms}, "
+         "{name: t, wcet: 1ms, activation: data, after: s}]}]}}\n"
+         "  - {name: b, match: {name: b}, workload: {dags: [{name: d, tasks: [" +
+         tasks + "]}]}}\nlinks:\n  - " + link + "\n";
+}
+
+TEST(RobotYaml, ReadsLinks) {
+  const std::string text =
+      with_link("{from: a.d.t, to: b.d.u, transport: 300us}", "{name: u, wcet: 1ms, period: 9ms}");
+  const Result<LoadedRobot> loaded = read(text);
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  ASSERT_EQ(loaded->robot.links.size(), 1u);
+  const Link &link = loaded->robot.links[0];
+  EXPECT_EQ(link.from.process, 0u);
+  EXPECT_EQ(link.from.task, TaskId(1));
+  EXPECT_EQ(link.to.process, 1u);
+  EXPECT_EQ(link.to.name, "b.d.u");
+  EXPECT_EQ(link.transport, 300 * kMicrosecond);
+}
+
+TEST(RobotYaml, RefusesLinksThatReleaseNothing) {
+  const std::string receiver = "{name: u, wcet: 1ms, period: 9ms}";
+  EXPECT_EQ(findings(with_link("{from: a.d.t, to: b.d.u}", receiver)),
+            "cart.yaml:7:5: error: the link has no 'transport' (write {from: PROCESS.DAG.TASK, to: PROCESS.DAG.TASK, "
+            "transport: TIME})");
+  EXPECT_EQ(findings(with_link("{from: a.d.x, to: b.d.u, transport: 0}", receiver)),
+            "cart.yaml:7:12: error: there is no task 'a.d.x' (did you mean 'a.d.s'?)");
+  EXPECT_EQ(findings(with_link("{from: b.d.u, to: a.d.t, transport: 0}", receiver)),
+            "cart.yaml:7:23: error: task 'a.d.t' has predecessors in its process (add a task without predecessors that "
+            "receives the data)");
+  EXPECT_EQ(findings(with_link("{from: a.d.s, to: a.d.t, transport: 0}", receiver)),
+            "cart.yaml:7:23: error: the link stays within a process (write an edge in its workload: 'after:')");
+  EXPECT_EQ(findings(with_link("{from: a.d.t, to: b.d.u, transport: 0}", "{name: u, wcet: 1ms, period: 8ms}")),
+            "cart.yaml:7:23: error: task 'b.d.u' has the period 8ms, and 'a.d.t', whose data release it, has 9ms (write "
+            "'period: 9ms' in its workload)");
+  EXPECT_EQ(
+      findings(with_link("{from: a.d.t, to: b.d.u, transport: 0}", "{name: u, wcet: 1ms, period: 9ms, jitter: 1us}")),
+      "cart.yaml:7:23: error: task 'b.d.u' has a jitter, which would follow from the link (remove 'jitter:' in its "
+      "workload)");
+  EXPECT_EQ(findings(with_link("{from: a.d.t, to: b.d.u, transport: 0}\n"
+                               "  - {from: a.d.s, to: b.d.u, transport: 0}",
+                               receiver)),
+            "cart.yaml:8:23: error: task 'b.d.u' has the data of another link already (add a task for the data of "
+            "each)");
+}
+
 TEST(RobotYaml, RefusesWhatCannotMatch) {
   EXPECT_EQ(findings(with_threads("{name: t, match: {thread: a_name_of_sixteen}, level: below}")),
             "cart.yaml:17:31: error: thread 'a_name_of_sixteen' matches nothing: the kernel keeps 15 characters of a "
@@ -151,14 +199,15 @@ TEST(RobotYaml, ReportsMistakesOfFilesInThem) {
             "/nowhere/a.yaml: error: cannot open: No such file or directory");
 }
 
-TEST(RobotYaml, TheShippedExampleIsSound) {
-  const std::string path = (testing::repository() / "examples" / "robot" / "cart.yaml").string();
-  const Result<Input> input = load_input(path);
-  ASSERT_TRUE(input) << to_string(input.error());
-  EXPECT_TRUE(input->warnings.empty()) << to_string(input->warnings);
-  ASSERT_TRUE(input->workload) << to_string(input->workload.error());
-  EXPECT_TRUE(input->workload->warnings.empty()) << to_string(input->workload->warnings);
-  EXPECT_EQ(input->workload->workload.task_count(), 7u);
+TEST(RobotYaml, TheShippedExamplesAreSound) {
+  for (const auto &[name, tasks] : {std::pair{"cart.yaml", 7u}, std::pair{"brake.yaml", 5u}}) {
+    const Result<Input> input = load_input((testing::repository() / "examples" / "robot" / name).string());
+    ASSERT_TRUE(input) << to_string(input.error());
+    EXPECT_TRUE(input->warnings.empty()) << to_string(input->warnings);
+    ASSERT_TRUE(input->workload) << to_string(input->workload.error());
+    EXPECT_TRUE(input->workload->warnings.empty()) << to_string(input->workload->warnings);
+    EXPECT_EQ(input->workload->workload.task_count(), tasks);
+  }
 }
 
 }  // namespace

@@ -18,6 +18,7 @@
 #include "redag_lab/robot/plan.hpp"
 #include "redag_lab/robot/union.hpp"
 #include "redag_testing/bound_property.hpp"
+#include "redag_testing/builders.hpp"
 #include "redag_testing/random_workloads.hpp"
 
 namespace redag::robot {
@@ -33,6 +34,7 @@ class SimulatedProcess {
   struct Job {
     TaskId task;
     Time release = 0;
+    Time origin = 0;  // the release behind its data, in whatever process
     Duration left = 0;
     int priority = 0;
     std::uint64_t since = 0;  // when it came to this priority, for SCHED_FIFO's order of equals
@@ -64,8 +66,11 @@ class SimulatedProcess {
       if (dispatch.kind == sched::DispatchKind::Start) {
         const Duration wcet = tasks_[dispatch.task.value].task->wcet;
         const bool is_long = testing::chance(rng, 0.7);
-        job = Job{
-            .task = dispatch.task, .release = dispatch.release, .left = is_long ? wcet : kTick, .since = ++sequence};
+        job = Job{.task = dispatch.task,
+                  .release = dispatch.release,
+                  .origin = dispatch.origin,
+                  .left = is_long ? wcet : kTick,
+                  .since = ++sequence};
       }
       const int priority = band_.of_level(dispatch.level);
       if (priority != job.priority) job.since = ++sequence;
@@ -109,7 +114,7 @@ void run_kernel(std::deque<SimulatedProcess> &processes, std::size_t cpus) {
   }
 }
 
-Workload random_process(Rng &rng) {
+Workload random_process(Rng &rng, double most_load) {
   testing::BoundCaseLimits limits;
   limits.min_workers = limits.max_workers = 2;
   limits.policies = {PolicyKind::RateMonotonic};
@@ -118,8 +123,8 @@ Workload random_process(Rng &rng) {
   limits.max_tasks = 3;
   limits.groups = testing::chance(rng, 0.4);
   limits.caps = testing::chance(rng, 0.4);
-  limits.min_utilization = 0.1;
-  limits.max_utilization = 0.5;
+  limits.min_utilization = most_load / 5;
+  limits.max_utilization = most_load;
   limits.max_period = 40;
   Workload workload = testing::random_bound_case(rng, limits).workload;
   workload.platform.preemption = PreemptionMode::Os;
@@ -134,8 +139,15 @@ Workload random_process(Rng &rng) {
 
 struct Observed {
   std::uint64_t jobs = 0;
+  std::uint64_t crossed = 0;  // of these, jobs whose data came from another process
   std::string violation;
 };
+
+bool is_linked(const Robot &robot, std::size_t process, TaskId task) {
+  return std::any_of(robot.links.begin(), robot.links.end(), [&](const Link &link) {
+    return link.to.process == process && link.to.task == task;
+  });
+}
 
 // Simulates the processes, and compares each response with the bound of the task in the union.
 Observed observe(const Robot &robot, const Plan &plan, const analysis::Report &report, std::size_t cpus,
@@ -150,6 +162,8 @@ Observed observe(const Robot &robot, const Plan &plan, const analysis::Report &r
   };
   std::vector<Timer> timers;
   std::vector<std::size_t> first_task;  // of the process in the union
+  std::vector<std::size_t> first_dag;
+  std::size_t dags = 0;
   std::size_t tasks = 0;
   Duration longest = 0;
   for (std::size_t p = 0; p < robot.processes.size(); ++p) {
@@ -166,27 +180,53 @@ Observed observe(const Robot &robot, const Plan &plan, const analysis::Report &r
       longest = std::max(longest, period);
     }
     for (const TaskRef &ref : processes.back().tasks()) {
-      if (ref.task->activation != Activation::Timer) continue;
+      if (ref.task->activation != Activation::Timer || is_linked(robot, p, ref.id)) continue;
       timers.push_back(Timer{p, ref.id, ref.task->offset + offsets[ref.dag.value], ref.task->period});
     }
     first_task.push_back(tasks);
     tasks += workload.task_count();
+    first_dag.push_back(dags);
+    dags += workload.dags.size();
   }
+  struct Message {
+    TaskOf to;
+    Time origin;
+    Time arrival;
+  };
+  std::vector<Message> messages;
   Observed observed;
   std::uint64_t sequence = 0;
   for (Time now = 0; now < 12 * longest; now += kTick) {
     for (std::size_t p = 0; p < processes.size(); ++p) {
       processes[p].complete(now, [&](const SimulatedProcess::Job &job) {
-        const std::size_t id = first_task[p] + job.task.value;
-        const std::optional<Duration> bound = report.tasks[id].response;
+        for (const Link &link : robot.links) {
+          if (link.from.process != p || link.from.task != job.task) continue;
+          const auto longest_ticks = static_cast<std::uint32_t>(link.transport / kTick);
+          const std::uint32_t ticks = testing::chance(rng, 0.5) ? longest_ticks : testing::between(rng, 0, longest_ticks);
+          messages.push_back(Message{link.to, job.origin, now + ticks * kTick});
+        }
+        // Of data of another process, the bound of the DAG counts from the release in the first process on.
+        const TaskRef &task = processes[p].tasks()[job.task.value];
+        const bool is_crossed = p == robot.processes.size() - 1 && !robot.links.empty();
+        const bool is_sink = is_crossed && task.task->activation == Activation::Data;
+        const analysis::Tightest &tightest =
+            is_sink ? report.dags[first_dag[p] + task.dag.value] : report.tasks[first_task[p] + job.task.value];
+        const std::optional<Duration> bound = tightest.response;
         if (!bound) return;
         ++observed.jobs;
-        if (now - job.release > *bound + static_cast<Duration>(tasks) && observed.violation.empty()) {
-          observed.violation = fmt::format("process {}, task {}: {} > {} by {}", p, job.task.value, now - job.release,
-                                           *bound, report.tasks[id].method->name);
+        if (is_crossed) ++observed.crossed;
+        const Duration response = now - (is_crossed ? job.origin : job.release);
+        if (response > *bound + static_cast<Duration>(tasks) && observed.violation.empty()) {
+          observed.violation = fmt::format("process {}, task {}: {} > {} by {}", p, job.task.value, response, *bound,
+                                           tightest.method->name);
         }
       });
     }
+    std::erase_if(messages, [&](const Message &message) {
+      if (message.arrival > now) return false;
+      processes[message.to.process].release(message.to.task, message.origin, now);
+      return true;
+    });
     for (Timer &timer : timers) {
       if (timer.next > now) continue;
       processes[timer.process].release(timer.task, timer.next, now);
@@ -198,17 +238,49 @@ Observed observe(const Robot &robot, const Plan &plan, const analysis::Report &r
   return observed;
 }
 
-Robot random_robot(Rng &rng, std::vector<int> cpus) {
+Robot random_robot(Rng &rng, std::vector<int> cpus, double most_load = 0.5) {
   Robot robot;
   robot.name = "r";
   robot.cpu_sets = {CpuSet{"", std::move(cpus)}};
   for (std::uint32_t p = testing::between(rng, 2, 3); p > 0; --p) {
     Process process;
     process.name = fmt::format("p{}", p);
-    process.workload = random_process(rng);
+    process.workload = random_process(rng, most_load);
     robot.processes.push_back(std::move(process));
   }
   return robot;
+}
+
+// Data have to arrive within a period.
+constexpr double kLoadWithLinks = 0.2;
+
+// Adds a process whose DAGs receive data of the others, each from a task of a DAG with one timer.
+void add_receiver(Rng &rng, Robot &robot) {
+  std::vector<testing::TestTask> tasks;
+  std::vector<Dag> dags;
+  const std::size_t receiver = robot.processes.size();
+  for (std::size_t p = 0; p < receiver; ++p) {
+    const Workload &workload = *robot.processes[p].workload;
+    for (const TaskRef &ref : flatten(workload)) {
+      const std::vector<Task> &siblings = workload.dags[ref.dag.value].tasks;
+      const auto timers = std::count_if(siblings.begin(), siblings.end(),
+                                        [](const Task &task) { return task.activation == Activation::Timer; });
+      if (timers != 1 || dags.size() == 2 || testing::chance(rng, 0.5)) continue;
+      const Duration period = ref.task->period;
+      const auto wcet = [&] { return testing::between(rng, 1, 2) * kTick; };
+      dags.push_back(testing::tick_dag(fmt::format("d{}", dags.size()),
+                                       {{.name = "in", .period = period, .wcet = wcet(), .deadline = 4 * period},
+                                        {.name = "out", .wcet = wcet(), .after = {0}}}));
+      const auto first = static_cast<std::uint32_t>(2 * (dags.size() - 1));
+      robot.links.push_back(
+          Link{{p, ref.id, "from"}, {receiver, TaskId(first), "to"}, testing::between(rng, 0, 3) * kTick, {}});
+    }
+  }
+  if (dags.empty()) return;
+  Process process;
+  process.name = "receiver";
+  process.workload = testing::make_workload(std::move(dags), 2, PreemptionMode::Os);
+  robot.processes.push_back(std::move(process));
 }
 
 // Bounds and order of a robot, for priorities up to `limit`.
@@ -240,6 +312,46 @@ TEST(RobotUnionBounds, HoldForSchedulersAboveOneKernel) {
   }
   EXPECT_GT(bounded, count / 2);
   EXPECT_GT(jobs, count * 50);
+}
+
+// Data that cross to another process, and its bounds from the release behind them on.
+TEST(RobotUnionBounds, HoldForDataOfOtherProcesses) {
+  std::uint64_t robots = 0;
+  std::uint64_t crossed = 0;
+  const std::uint64_t count = testing::how_many(1500);
+  for (std::uint64_t seed = 1; seed <= count; ++seed) {
+    Rng rng(seed);
+    Robot robot = random_robot(rng, testing::chance(rng, 0.3) ? std::vector{0} : std::vector{0, 1}, kLoadWithLinks);
+    add_receiver(rng, robot);
+    if (robot.links.empty() || !union_of(robot, 79)) continue;  // too much load for the links
+    ++robots;
+    const auto [plan, report] = analysed(robot, 90);
+    for (std::uint64_t run = 0; run < 3; ++run) {
+      const Observed observed = observe(robot, plan, report, robot.cpu_sets[0].cpus.size(), seed * 1000 + run);
+      crossed += observed.crossed;
+      ASSERT_EQ(observed.violation, "") << "seed " << seed << ", run " << run;
+    }
+  }
+  RecordProperty("robots", static_cast<int>(robots));
+  RecordProperty("crossed", static_cast<int>(crossed));
+  EXPECT_GT(robots, count / 15);
+  EXPECT_GT(crossed, robots * 20);
+}
+
+// The same, with bounds that count from the release of the data: they do not hold.
+TEST(RobotUnionBounds, BreakWhereDataAreTakenToBeThere) {
+  std::uint64_t violations = 0;
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    Rng rng(seed);
+    Robot robot = random_robot(rng, {0, 1}, kLoadWithLinks);
+    add_receiver(rng, robot);
+    if (robot.links.empty() || !union_of(robot, 79)) continue;
+    Robot without = robot;
+    without.links.clear();
+    const Analysed analysed_without = analysed(without, 90);
+    if (!observe(robot, analysed_without.plan, analysed_without.report, 2, seed).violation.empty()) ++violations;
+  }
+  EXPECT_GT(violations, 5U);
 }
 
 // The same comparison, where the kernel has one processor less than the union: it notices.

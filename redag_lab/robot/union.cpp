@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "redag/model/validate.hpp"
+#include "redag_lab/robot/links.hpp"
 #include "redag_lab/robot/order.hpp"
 
 namespace redag::robot {
@@ -40,6 +41,9 @@ class Union {
     if (order_.is_merged() || has_above_) fix_priorities();
     Diagnostics found = validate(workload_, options);
     if (has_errors(found)) return tl::unexpected<Diagnostics>(std::move(found));
+    const Result<void> linked =
+        set_jitter_of_links(robot_, first_task_, analysis::platform_of(workload_), workload_);
+    if (!linked) return tl::unexpected<Diagnostics>(linked.error());
     return LoadedWorkload{std::move(workload_), std::move(found), true};
   }
 
@@ -50,6 +54,7 @@ class Union {
 
   void add_process(std::size_t p) {
     const Process &process = robot_.processes[p];
+    first_task_.push_back(levels_.size());
     if (!process.workload) return;
     check_executor(p);
     if (process.name == kThreads) {
@@ -108,7 +113,7 @@ class Union {
     const Threads &threads = robot_.threads[t];
     if (!threads.level) return;
     if (threads.level->kind == Level::Kind::Task) {
-      const Process &process = robot_.processes[threads.level->process];
+      const Process &process = robot_.processes[threads.level->task.process];
       if (threads.cpus.empty() || threads.cpus == robot_.cpu_sets[process.cpu_set].cpus) return;
       refuse(threads.place,
              fmt::format("threads '{}' execute a task of process '{}', but on other processors than it has",
@@ -189,7 +194,8 @@ class Union {
   Workload workload_;
   Diagnostics mistakes_;
   std::vector<std::size_t> set_of_dag_;
-  std::vector<int> levels_;  // by TaskId of the union
+  std::vector<int> levels_;              // by TaskId of the union
+  std::vector<std::size_t> first_task_;  // by process: the first of its tasks in the union
   bool has_above_ = false;   // some task is above all levels of the order
 };
 

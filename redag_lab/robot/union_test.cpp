@@ -60,6 +60,33 @@ std::string refusal(const Robot &robot) {
   return united ? "accepted" : to_string(united.error());
 }
 
+Robot linked(Duration transport) {
+  Robot robot = robot_of({one_task(10, 2), one_task(10, 1)}, {CpuSet{"", {0}}});
+  robot.links = {
+      {{0, TaskId(0), "p0.d.t"}, {1, TaskId(0), "p1.d.t"}, transport * kMillisecond, {"cart.yaml", 40, 5}}};
+  return robot;
+}
+
+TEST(RobotUnion, DataOfAnotherProcessAreLateByItsBoundAndTheTransport) {
+  const Result<LoadedWorkload> united = union_of(linked(1), kLevels);
+  ASSERT_TRUE(united) << to_string(united.error());
+  // Both are of one level: 2 ms, and 1 ms for the other one. Then 1 ms of transport.
+  EXPECT_EQ(united->workload.dags[1].tasks[0].jitter, 4 * kMillisecond);
+}
+
+TEST(RobotUnion, RefusesLinksWithoutABound) {
+  EXPECT_EQ(refusal(linked(8)),
+            "cart.yaml:40:5: error: data of 'p0.d.t' can arrive 12ms after the release behind them, which is more than "
+            "their period 10ms (lower the load, or the rate)");
+  Robot robot = linked(1);
+  robot.processes[0].workload->dags[0].tasks[0].wcet = 9 * kMillisecond;
+  robot.processes.push_back(robot.processes[0]);
+  robot.processes.back().name = "p2";
+  EXPECT_EQ(refusal(robot),
+            "cart.yaml:40:5: error: nothing bounds the response time of 'p0.d.t', and so when its data arrive ('redag "
+            "analyze' says why there is no bound, if the link is left out)");
+}
+
 // Random workloads in processes are the workload that one would write by hand: their DAGs one after the other, with
 // names and groups of their own.
 RC_GTEST_PROP(RobotUnion, IsTheWorkloadWrittenByHand, ()) {
@@ -155,7 +182,7 @@ TEST(RobotUnion, RefusesOtherOrdersAndModes) {
   robot.processes[0].workload->platform.preemption = PreemptionMode::Cooperative;
   EXPECT_NE(refusal(robot).find("runs with preemption cooperative"), std::string::npos) << refusal(robot);
   robot.threads.push_back(threads_at(Level::Kind::Task, 0, 0));
-  robot.threads[0].level->task = TaskId(0);
+  robot.threads[0].level->task.task = TaskId(0);
   EXPECT_EQ(refusal(robot), "accepted") << "threads execute all its tasks: no executor chooses";
 }
 

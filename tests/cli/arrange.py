@@ -122,7 +122,7 @@ dags:
 
     def test_validate_reports_robots(self):
         result = self.expect(redag("validate", "--strict", EXAMPLE), 0)
-        self.assertIn("robot of 3 processes on 2 processors, 3 entries of threads, 1 entry of irqs: 4 DAGs", result.stdout)
+        self.assertIn("robot of 3 processes on 2 processors, 0 links, 3 entries of threads, 1 entry of irqs: 4 DAGs", result.stdout)
         robot = self.write("robot.yaml", EXAMPLE.read_text().replace("wcet: 500us", "wcet: 500").replace(
             "workload: drive.yaml", f"workload: {EXAMPLE.parent}/drive.yaml"))
         self.assertRegex(self.expect(redag("validate", robot), 2).stderr, r"robot.yaml:\d+:\d+: error: wcet: '500' is not a duration")
@@ -134,6 +134,20 @@ dags:
         self.assertRegex(result.stderr, r"robot.yaml:24:5: error: threads 'scan' can delay tasks, and nothing says for how")
         self.assertRegex(self.expect(redag("validate", robot), 0).stderr, r"robot.yaml:24:5: warning: threads 'scan' can")
         self.expect(redag("arrange", robot, "--rtprio", "90"), 0)
+
+    def test_links_bound_chains_over_processes(self):
+        linked = EXAMPLE.parent / "brake.yaml"
+        document = json.loads(self.expect(redag("analyze", linked, "--check", "--json"), 0).stdout)
+        bound = {dag["name"]: dag["bound_ns"] for dag in document["dags"]}
+        self.assertGreaterEqual(bound["drive/avoid"], bound["vision/camera"] + 500_000 + 1_200_000)
+        self.expect(redag("simulate", linked, "--duration", "2s"), 0)
+        for command in (["tune"], ["assign"], ["sensitivity"]):
+            self.assertIn(f"{command[0]} changes tasks", self.expect(redag(*command, linked), 2).stderr)
+        for command in (["analyze", "--overhead-release", "1us"], ["simulate", "--workers", "3"]):
+            self.assertIn("hold for the platform in its file", self.expect(redag(*command, linked), 2).stderr)
+        late = self.write("late.yaml", linked.read_text().replace("transport: 500us", "transport: 30ms"))
+        self.assertRegex(self.expect(redag("analyze", late), 2).stderr,
+                         r"late.yaml:\d+:5: error: data of 'vision.camera.detect' can arrive .* more than their period 33ms")
 
     def test_commands_that_want_a_workload_say_so(self):
         result = self.expect(redag("arrange", SOURCE / "workloads" / "hello.yaml"), 2)

@@ -73,8 +73,9 @@ Json facts_json(const std::string &name, const Facts &facts) {
 std::string describe(const robot::Robot &robot) {
   std::size_t cpus = 0;
   for (const robot::CpuSet &set : robot.cpu_sets) cpus += set.cpus.size();
-  return fmt::format("robot of {} on {}, {} of threads, {} of irqs", plural(robot.processes.size(), "process", "es"),
-                     plural(cpus, "processor"), plural(robot.threads.size(), "entr", "ies", "y"),
+  return fmt::format("robot of {} on {}, {}, {} of threads, {} of irqs",
+                     plural(robot.processes.size(), "process", "es"), plural(cpus, "processor"),
+                     plural(robot.links.size(), "link"), plural(robot.threads.size(), "entr", "ies", "y"),
                      plural(robot.interrupts.size(), "entr", "ies", "y"));
 }
 

@@ -18,7 +18,6 @@
 #include "redag/base/text.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/output_file.hpp"
-#include "redag_lab/cli/terminal/workload_input.hpp"
 #include "redag_lab/run/variant.hpp"
 
 namespace redag::cli {
@@ -44,12 +43,6 @@ bool is_number(std::string_view text) {
 }
 
 }  // namespace
-
-Result<LoadedWorkload> load_input(const std::string &path, LoadOptions options) {
-  Result<robot::Input> input = load_workload_or_robot(path, options);
-  if (!input) return tl::unexpected<Diagnostics>(std::move(input.error()));
-  return robot::as_workload(*std::move(input));
-}
 
 Result<void> write_text(const std::string &path, std::string_view text) {
   std::error_code ignored;

@@ -14,9 +14,6 @@
 
 namespace redag::cli {
 
-/// Reads a workload, or a robot as one workload, from a file, or from standard input if `path` is "-".
-[[nodiscard]] Result<LoadedWorkload> load_input(const std::string &path, LoadOptions options = {});
-
 /// Writes a whole file or nothing (trace::OutputFile). Devices and pipes are written directly.
 [[nodiscard]] Result<void> write_text(const std::string &path, std::string_view text);
 
