@@ -64,8 +64,8 @@ struct PartRow {
   [[nodiscard]] bool is_work() const;
 };
 
-/// Returns a job's parts, earliest first, in at most `most` rows (at least 3). If there are more parts, the longest ones
-/// have rows of their own, and those between them have one together. The rows refer to `parts`.
+/// Returns a job's parts, earliest first, in at most `most` rows (at least 3). If there are more parts, the longest
+/// ones have rows of their own, and those between them have one together. The rows refer to `parts`.
 [[nodiscard]] std::vector<PartRow> rows_of(std::span<const Part> parts, std::size_t most);
 
 class Investigation {

@@ -29,8 +29,7 @@ Result<Responses> responses_of(const Workload &workload, const analysis::Analysi
   responses.dags.resize(workload.dags.size());
   for (const ClusterPart &part : parts_of(workload)) {
     if (part.workload.dags.empty()) continue;
-    const Result<analysis::TaskSet> task_set =
-        analysis::compile(part.workload, analysis::platform_of(platform, part));
+    const Result<analysis::TaskSet> task_set = analysis::compile(part.workload, analysis::platform_of(platform, part));
     if (!task_set) return tl::unexpected<Diagnostics>(task_set.error());
     const analysis::Report report = analysis::analyze(*task_set);
     for (std::size_t t = 0; t < part.tasks.size(); ++t) responses.tasks[part.tasks[t].value] = report.tasks[t].response;
@@ -74,15 +73,16 @@ class Iteration {
     for (const Crossing &crossing : crossings_) {
       const std::optional<Duration> response = response_of(crossing.from, responses);
       if (!response) {
-        mistakes.push_back(mistake(
-            crossing,
-            fmt::format("nothing bounds the response time of '{}', and so when its data arrive", crossing.link.from.name),
-            "'redag analyze' says why there is no bound, if the link is left out"));
+        mistakes.push_back(mistake(crossing,
+                                   fmt::format("nothing bounds the response time of '{}', and so when its data arrive",
+                                               crossing.link.from.name),
+                                   "'redag analyze' says why there is no bound, if the link is left out"));
       } else if (*response + crossing.link.transport > crossing.to.period) {
         mistakes.push_back(mistake(
             crossing,
             fmt::format("data of '{}' can arrive {} after the release behind them, which is more than their period {}",
-                        crossing.link.from.name, humanize_duration(*response + crossing.link.transport), format_duration(crossing.to.period)),
+                        crossing.link.from.name, humanize_duration(*response + crossing.link.transport),
+                        format_duration(crossing.to.period)),
             "lower the load, or the rate"));
       } else if (const Duration jitter = *response + crossing.link.transport; jitter > crossing.to.jitter) {
         crossing.to.jitter = jitter;

@@ -16,7 +16,8 @@
 namespace redag::robot {
 
 /// Sets the jitter of every `to` in `united`, the union of the robot on this platform; `first_task` is the TaskId there
-/// of each process's first task. Errors, each at its link: nothing bounds `from`; data can arrive a period late or more.
+/// of each process's first task. Errors, each at its link: nothing bounds `from`; data can arrive a period late or
+/// more.
 [[nodiscard]] Result<void> set_jitter_of_links(const Robot &robot, const std::vector<std::size_t> &first_task,
                                                const analysis::AnalysisPlatform &platform, Workload &united);
 

@@ -123,8 +123,7 @@ std::string with_link(const std::string &link, const std::string &tasks) {
 }
 
 TEST(RobotYaml, ReadsLinks) {
-  const std::string text =
-      with_link("{from: a.d.t, to: b.d.u, transport: 300us}", "{name: u, wcet: 1ms, period: 9ms}");
+  const std::string text = with_link("{from: a.d.t, to: b.d.u, transport: 300us}", "{name: u, wcet: 1ms, period: 9ms}");
   const Result<LoadedRobot> loaded = read(text);
   ASSERT_TRUE(loaded) << to_string(loaded.error());
   ASSERT_EQ(loaded->robot.links.size(), 1u);
@@ -148,9 +147,10 @@ TEST(RobotYaml, RefusesLinksThatReleaseNothing) {
             "receives the data)");
   EXPECT_EQ(findings(with_link("{from: a.d.s, to: a.d.t, transport: 0}", receiver)),
             "cart.yaml:7:23: error: the link stays within a process (write an edge in its workload: 'after:')");
-  EXPECT_EQ(findings(with_link("{from: a.d.t, to: b.d.u, transport: 0}", "{name: u, wcet: 1ms, period: 8ms}")),
-            "cart.yaml:7:23: error: task 'b.d.u' has the period 8ms, and 'a.d.t', whose data release it, has 9ms (write "
-            "'period: 9ms' in its workload)");
+  EXPECT_EQ(
+      findings(with_link("{from: a.d.t, to: b.d.u, transport: 0}", "{name: u, wcet: 1ms, period: 8ms}")),
+      "cart.yaml:7:23: error: task 'b.d.u' has the period 8ms, and 'a.d.t', whose data release it, has 9ms (write "
+      "'period: 9ms' in its workload)");
   EXPECT_EQ(
       findings(with_link("{from: a.d.t, to: b.d.u, transport: 0}", "{name: u, wcet: 1ms, period: 9ms, jitter: 1us}")),
       "cart.yaml:7:23: error: task 'b.d.u' has a jitter, which would follow from the link (remove 'jitter:' in its "

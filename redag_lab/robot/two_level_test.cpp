@@ -144,9 +144,8 @@ struct Observed {
 };
 
 bool is_linked(const Robot &robot, std::size_t process, TaskId task) {
-  return std::any_of(robot.links.begin(), robot.links.end(), [&](const Link &link) {
-    return link.to.process == process && link.to.task == task;
-  });
+  return std::any_of(robot.links.begin(), robot.links.end(),
+                     [&](const Link &link) { return link.to.process == process && link.to.task == task; });
 }
 
 // Simulates the processes, and compares each response with the bound of the task in the union.
@@ -202,7 +201,8 @@ Observed observe(const Robot &robot, const Plan &plan, const analysis::Report &r
         for (const Link &link : robot.links) {
           if (link.from.process != p || link.from.task != job.task) continue;
           const auto longest_ticks = static_cast<std::uint32_t>(link.transport / kTick);
-          const std::uint32_t ticks = testing::chance(rng, 0.5) ? longest_ticks : testing::between(rng, 0, longest_ticks);
+          const std::uint32_t ticks =
+              testing::chance(rng, 0.5) ? longest_ticks : testing::between(rng, 0, longest_ticks);
           messages.push_back(Message{link.to, job.origin, now + ticks * kTick});
         }
         // Of data of another process, the bound of the DAG counts from the release in the first process on.

@@ -41,8 +41,7 @@ class Union {
     if (order_.is_merged() || has_above_) fix_priorities();
     Diagnostics found = validate(workload_, options);
     if (has_errors(found)) return tl::unexpected<Diagnostics>(std::move(found));
-    const Result<void> linked =
-        set_jitter_of_links(robot_, first_task_, analysis::platform_of(workload_), workload_);
+    const Result<void> linked = set_jitter_of_links(robot_, first_task_, analysis::platform_of(workload_), workload_);
     if (!linked) return tl::unexpected<Diagnostics>(linked.error());
     return LoadedWorkload{std::move(workload_), std::move(found), true};
   }
@@ -196,7 +195,7 @@ class Union {
   std::vector<std::size_t> set_of_dag_;
   std::vector<int> levels_;              // by TaskId of the union
   std::vector<std::size_t> first_task_;  // by process: the first of its tasks in the union
-  bool has_above_ = false;   // some task is above all levels of the order
+  bool has_above_ = false;               // some task is above all levels of the order
 };
 
 }  // namespace

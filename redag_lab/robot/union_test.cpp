@@ -62,8 +62,7 @@ std::string refusal(const Robot &robot) {
 
 Robot linked(Duration transport) {
   Robot robot = robot_of({one_task(10, 2), one_task(10, 1)}, {CpuSet{"", {0}}});
-  robot.links = {
-      {{0, TaskId(0), "p0.d.t"}, {1, TaskId(0), "p1.d.t"}, transport * kMillisecond, {"cart.yaml", 40, 5}}};
+  robot.links = {{{0, TaskId(0), "p0.d.t"}, {1, TaskId(0), "p1.d.t"}, transport * kMillisecond, {"cart.yaml", 40, 5}}};
   return robot;
 }
 
@@ -72,6 +71,28 @@ TEST(RobotUnion, DataOfAnotherProcessAreLateByItsBoundAndTheTransport) {
   ASSERT_TRUE(united) << to_string(united.error());
   // Both are of one level: 2 ms, and 1 ms for the other one. Then 1 ms of transport.
   EXPECT_EQ(united->workload.dags[1].tasks[0].jitter, 4 * kMillisecond);
+}
+
+TEST(RobotUnion, LaterDataDelayTheirSenderMore) {
+  Robot robot = robot_of({one_task(20, 5), one_task(20, 4)}, {CpuSet{"", {0}}});
+  robot.links = {{{0, TaskId(0), "p0.d.t"}, {1, TaskId(0), "p1.d.t"}, 4 * kMillisecond, {}}};
+  const Result<LoadedWorkload> united = union_of(robot, kLevels);
+  ASSERT_TRUE(united) << to_string(united.error());
+  // The sender ends after 5 + 4 ms. Data that are 9 + 4 ms late let two of the receiver's jobs come in its way: 5 + 8.
+  EXPECT_EQ(united->workload.dags[1].tasks[0].jitter, (5 + 8 + 4) * kMillisecond);
+}
+
+TEST(RobotUnion, DataOfADagAreBehindTheReleaseOfItsSource) {
+  Robot robot = robot_of(
+      {make_workload({make_dag("d", {{.name = "s", .period = 10, .wcet = 2}, {.name = "t", .wcet = 3, .after = {0}}})},
+                     1, PreemptionMode::Os),
+       one_task(10, 1)},
+      {CpuSet{"", {0}}});
+  robot.links = {{{0, TaskId(1), "p0.d.t"}, {1, TaskId(0), "p1.d.t"}, 0, {}}};
+  const Result<LoadedWorkload> united = union_of(robot, kLevels);
+  ASSERT_TRUE(united) << to_string(united.error());
+  // Both tasks of the DAG, and two late jobs of the receiver.
+  EXPECT_EQ(united->workload.dags[1].tasks[0].jitter, (2 + 3 + 2 * 1) * kMillisecond);
 }
 
 TEST(RobotUnion, RefusesLinksWithoutABound) {

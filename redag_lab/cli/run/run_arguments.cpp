@@ -142,9 +142,9 @@ std::optional<Workload> load_configured(const RunArguments &arguments, Console &
   // What is said about the data of other processes was found for the platform of the file.
   const bool has_overheads = arguments.calibration || arguments.overheads != sim::Overheads{};
   if (has_links && changed_by != nullptr) {
-    console.error(fmt::format("{} changes tasks, and the jitter that follows from the robot's links depends on them",
-                              changed_by),
-                  "state the jitter of the tasks in place of the links");
+    console.error(
+        fmt::format("{} changes tasks, and the jitter that follows from the robot's links depends on them", changed_by),
+        "state the jitter of the tasks in place of the links");
     return std::nullopt;
   }
   if (has_links && (!is_unchanged || has_overheads)) {

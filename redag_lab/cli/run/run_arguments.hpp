@@ -64,8 +64,8 @@ void add_simulator_arguments(CLI::App &app, RunArguments &arguments);
 void add_thread_arguments(CLI::App &app, RunArguments &arguments);
 
 /// Returns the workload of `arguments.file` with the changes of the command line, and prints warnings and errors.
-/// Returns nothing if the workload cannot be run. `changed_by` names a command that changes tasks; it cannot use a robot
-/// with links, whose jitter depends on all tasks.
+/// Returns nothing if the workload cannot be run. `changed_by` names a command that changes tasks; it cannot use a
+/// robot with links, whose jitter depends on all tasks.
 [[nodiscard]] std::optional<Workload> load_configured(const RunArguments &arguments, Console &console,
                                                       LoadOptions options = {}, const char *changed_by = nullptr);
 /// The same for a command that changes tasks and cannot use a workload with clusters.
