@@ -83,14 +83,17 @@ TEST(RobotUnion, LaterDataDelayTheirSenderMore) {
 }
 
 TEST(RobotUnion, DataOfADagAreBehindTheReleaseOfItsSource) {
-  Robot robot = robot_of(
-      {make_workload({make_dag("d", {{.name = "s", .period = 10, .wcet = 2}, {.name = "t", .wcet = 3, .after = {0}}})},
-                     2, PreemptionMode::Os),
-       one_task(10, 1)});
+  const Workload sender =
+      make_workload({make_dag("d", {{.name = "s", .period = 40, .wcet = 2}, {.name = "t", .wcet = 3, .after = {0}}})},
+                    2, PreemptionMode::Os);
+  const Workload receiver = make_workload({make_dag("d", {{.name = "t", .period = 40, .wcet = 1, .group = "g"}}),
+                                           make_dag("e", {{.name = "u", .period = 90, .wcet = 1, .group = "g"}})},
+                                          2, PreemptionMode::Os);
+  Robot robot = robot_of({sender, receiver});
   robot.links = {{{0, TaskId(1), "p0.d.t"}, {1, TaskId(0), "p1.d.t"}, 0, {}}};
   const Result<LoadedWorkload> united = union_of(robot, kLevels);
   ASSERT_TRUE(united) << to_string(united.error());
-  // On two processors, the bound of "t" alone counts from the end of "s".
+  // With groups on two processors, the bound of "t" alone counts from the end of "s".
   EXPECT_GE(united->workload.dags[1].tasks[0].jitter, (2 + 3) * kMillisecond);
 }
 
