@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <functional>
 #endif
 
 namespace closed_loop {
@@ -21,9 +22,16 @@ namespace closed_loop {
 
 bool can_render() { return false; }
 
+constexpr const char* kNoRenderer = "built without a renderer: libosmesa6-dev and libpng-dev were missing";
+
 void write_frames(const std::string& /*path*/, const std::vector<Recorded>& /*runs*/,
                   const std::vector<Time>& /*times*/) {
-  throw std::runtime_error("built without a renderer: libosmesa6-dev and libpng-dev were missing");
+  throw std::runtime_error(kNoRenderer);
+}
+
+void write_movie(const std::string& /*folder*/, const std::vector<Recorded>& /*runs*/,
+                 const std::vector<Time>& /*times*/) {
+  throw std::runtime_error(kNoRenderer);
 }
 
 #else
@@ -134,6 +142,27 @@ Snapshot at(const std::vector<Snapshot> &snapshots, Time time) {
   return next == snapshots.end() ? snapshots.back() : *next;
 }
 
+Image frame(Renderer &renderer, const std::vector<PlantSpec> &specs, const Recorded &run, Time time) {
+  std::vector<Snapshot> snapshots;
+  for (const PlantResult &plant : run.plants) snapshots.push_back(at(plant.snapshots, time));
+  return renderer.draw(specs, snapshots, run.executor,
+                       fmt::format("{:.2f} s", static_cast<double>(time) / redag::kSecond));
+}
+
+// Returns `columns` by `rows` scenes side by side.
+Image grid(std::size_t columns, std::size_t rows, const std::function<Image(std::size_t, std::size_t)> &scene) {
+  const auto across = static_cast<int>(columns);
+  const auto down = static_cast<int>(rows);
+  Image image(across * (kWidth + kGap) - kGap, down * (kHeight + kGap) - kGap);
+  for (int row = 0; row < down; ++row) {
+    for (int column = 0; column < across; ++column) {
+      image.paste(scene(static_cast<std::size_t>(column), static_cast<std::size_t>(row)), column * (kWidth + kGap),
+                  row * (kHeight + kGap));
+    }
+  }
+  return image;
+}
+
 }  // namespace
 
 bool can_render() { return true; }
@@ -141,22 +170,19 @@ bool can_render() { return true; }
 void write_frames(const std::string &path, const std::vector<Recorded> &runs, const std::vector<Time> &times) {
   const std::vector<PlantSpec> specs = plants();
   Renderer renderer(specs);
-  const auto columns = static_cast<int>(times.size());
-  const auto rows = static_cast<int>(runs.size());
-  Image strip(columns * (kWidth + kGap) - kGap, rows * (kHeight + kGap) - kGap);
-  for (int row = 0; row < rows; ++row) {
-    for (int column = 0; column < columns; ++column) {
-      std::vector<Snapshot> snapshots;
-      for (const PlantResult &plant : runs[static_cast<std::size_t>(row)].plants) {
-        snapshots.push_back(at(plant.snapshots, times[static_cast<std::size_t>(column)]));
-      }
-      const Time time = times[static_cast<std::size_t>(column)];
-      strip.paste(renderer.draw(specs, snapshots, runs[static_cast<std::size_t>(row)].executor,
-                                fmt::format("{:.2f} s", static_cast<double>(time) / redag::kSecond)),
-                  column * (kWidth + kGap), row * (kHeight + kGap));
-    }
+  grid(times.size(), runs.size(), [&](std::size_t column, std::size_t row) {
+    return frame(renderer, specs, runs[row], times[column]);
+  }).write(path);
+}
+
+void write_movie(const std::string &folder, const std::vector<Recorded> &runs, const std::vector<Time> &times) {
+  const std::vector<PlantSpec> specs = plants();
+  Renderer renderer(specs);
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    grid(runs.size(), 1, [&](std::size_t column, std::size_t) {
+      return frame(renderer, specs, runs[column], times[i]);
+    }).write(fmt::format("{}/{:04}.png", folder, i));
   }
-  strip.write(path);
 }
 
 #endif

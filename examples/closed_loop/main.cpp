@@ -33,6 +33,7 @@ using redag::kSecond;
 namespace {
 
 constexpr Duration kSnapshots = 10 * kMillisecond;
+constexpr Duration kMovieFrame = 40 * kMillisecond;
 
 struct Arguments {
   std::string workload = REDAG_SOURCE_DIR "/examples/closed_loop/robot.yaml";
@@ -41,6 +42,7 @@ struct Arguments {
   std::uint32_t seeds = 3;
   std::uint64_t seed = 1;
   double seconds = 20;
+  double movie = 0;  // seconds
   std::string out;
   std::string stress;
 };
@@ -144,9 +146,9 @@ void print(const std::vector<Row> &rows, const std::vector<std::string> &executo
   }
 }
 
-// Returns instants around a first fall. Among the executors under which a plant fell, it takes the one with the fewest
+// Returns the instant of a first fall. Among the executors under which a plant fell, it takes the one with the fewest
 // falls: there the executors can be compared.
-std::vector<Time> moments(const std::vector<Recorded> &runs, Time end) {
+Time fall_of(const std::vector<Recorded> &runs, Time end) {
   Time fall = end / 2;
   std::uint32_t fewest = std::numeric_limits<std::uint32_t>::max();
   for (const Recorded &run : runs) {
@@ -162,8 +164,20 @@ std::vector<Time> moments(const std::vector<Recorded> &runs, Time end) {
     fewest = falls;
     fall = first;
   }
+  return fall;
+}
+
+std::vector<Time> moments(Time fall) {
   std::vector<Time> times;
   for (const int before : {200, 80, 40, 0}) times.push_back(std::max<Time>(0, fall - before * kMillisecond));
+  return times;
+}
+
+// Returns the instants of a movie that ends a little after the fall.
+std::vector<Time> instants(Time fall, Duration length) {
+  const Time end = fall + length / 4;
+  std::vector<Time> times;
+  for (Time time = std::max<Time>(0, end - length); time < end; time += kMovieFrame) times.push_back(time);
   return times;
 }
 
@@ -210,12 +224,17 @@ int run(const Arguments &arguments) {
             fmt::format("{}, seed {}, {:g} s; the same pushes and the same jobs for every executor",
                         arguments.threads ? "threads" : "virtual time", arguments.seed, arguments.seconds)));
   if (can_render()) {
-    write_frames(out / "frames.png", recorded, moments(recorded, setup.duration));
+    const Time fall = fall_of(recorded, setup.duration);
+    write_frames(out / "frames.png", recorded, moments(fall));
+    if (arguments.movie > 0) {
+      std::filesystem::create_directories(out / "movie");
+      write_movie(out / "movie", recorded, instants(fall, static_cast<Duration>(arguments.movie * kSecond)));
+    }
   } else {
     fmt::print(stderr, "no frames: built without libosmesa6-dev and libpng-dev\n");
   }
-  fmt::print("wrote {}: results.csv, states.csv, trajectories.svg{}\n", out.string(),
-             can_render() ? ", frames.png" : "");
+  fmt::print("wrote {}: results.csv, states.csv, trajectories.svg{}{}\n", out.string(),
+             can_render() ? ", frames.png" : "", can_render() && arguments.movie > 0 ? ", movie/" : "");
   return 0;
 }
 
@@ -242,6 +261,9 @@ int main(int argc, char **argv) {
   app.add_option("--seconds", arguments.seconds, "Length of a run")
       ->check(CLI::Range(0.1, 3600.0))
       ->capture_default_str();
+  app.add_option("--movie", arguments.movie,
+                 "Also draw this many seconds around a fall, 25 frames a second, to OUT/movie")
+      ->check(CLI::Range(0.1, 60.0));
   app.add_option("--out", arguments.out, "Folder for results.csv, states.csv, trajectories.svg and frames.png");
   CLI11_PARSE(app, argc, argv);
   watch_signals();

@@ -27,4 +27,7 @@ struct Recorded {
 /// failure, and where there is no renderer.
 void write_frames(const std::string &path, const std::vector<Recorded> &runs, const std::vector<Time> &times);
 
+/// Writes "0000.png" and so on into a folder: for each time the scenes of all runs, side by side. Throws as above.
+void write_movie(const std::string &folder, const std::vector<Recorded> &runs, const std::vector<Time> &times);
+
 }  // namespace closed_loop
