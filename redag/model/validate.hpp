@@ -118,6 +118,8 @@ struct ValidateOptions {
   bool cluster_optional = false;
   /// Allows tasks to wait without a worker. What does not know waits must not get such a workload.
   bool waits = false;
+  /// Workers of a file that states none.
+  std::uint32_t default_workers = 1;
 };
 
 /// Returns every broken rule, in the order of the workload. Linear in its size. Accepts any workload without a crash.

@@ -159,6 +159,7 @@ class Reader : private yaml::ValueReader {
   }
 
   void read_platform() {
+    workload_.platform.workers = options_.default_workers;
     platform_.node = find(root_, Field::Platform);
     if (platform_.node == nullptr) return;
     if (!check_map(*platform_.node, "platform", names_of(kPlatformFields))) {

@@ -16,7 +16,7 @@
 namespace redag::robot {
 namespace {
 
-constexpr int kMostRounds = 1000;
+constexpr int kMostRounds = 100;
 
 struct Responses {
   std::vector<std::optional<Duration>> tasks;  // by TaskId, from a job's own release on

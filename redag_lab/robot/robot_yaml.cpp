@@ -243,11 +243,15 @@ class RobotReader : private yaml::ValueReader {
   }
 
   void read_workload_of(const Node &node, Process &process) {
+    LoadOptions options = options_;
+    if (!is_broken_) {
+      options.default_workers = static_cast<std::uint32_t>(robot_.cpu_sets[process.cpu_set].cpus.size());
+    }
     Result<LoadedWorkload> loaded = [&]() -> Result<LoadedWorkload> {
-      if (node.kind == Node::Kind::Map) return read_workload(node, file_, options_);
+      if (node.kind == Node::Kind::Map) return read_workload(node, file_, options);
       const std::optional<std::string> path = text(node, "workload");
       if (!path) return tl::unexpected(Diagnostics{});
-      return load_workload(std::filesystem::path(file_).parent_path() / *path, options_);
+      return load_workload(std::filesystem::path(file_).parent_path() / *path, options);
     }();
     const bool is_inline = node.kind == Node::Kind::Map;
     if (!loaded && !is_inline && !loaded.error().empty()) {

@@ -190,6 +190,15 @@ TEST(RobotYaml, ReportsMistakesOfInlineWorkloadsAtTheirLines) {
             "in 5ms)");
 }
 
+TEST(RobotYaml, AProcessHasAWorkerForEachOfItsProcessors) {
+  const char *process =
+      "processes:\n  - {name: a, match: {name: a}, workload: {dags: [{name: d, tasks: [{name: s, wcet: 9ms, period: "
+      "10ms}, {name: t, wcet: 9ms, period: 10ms}]}]}}\n";
+  EXPECT_EQ(findings("robot: cart\ncpus: 0-1\n" + std::string(process)), "");
+  EXPECT_NE(findings("robot: cart\ncpus: 0\n" + std::string(process)).find("exceeds the capacity of 1 worker"),
+            std::string::npos);
+}
+
 TEST(RobotYaml, ReportsMistakesOfFilesInThem) {
   const std::string text = findings(
       "robot: cart\ncpus: 0\nprocesses:\n"
