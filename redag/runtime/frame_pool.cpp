@@ -15,9 +15,9 @@
 namespace redag::runtime {
 namespace {
 
-constexpr std::size_t kLeast = 64;
-constexpr std::size_t kMost = std::size_t{1} << 20U;
-constexpr std::size_t kClasses = std::bit_width(kMost / kLeast);
+constexpr std::size_t kLeastSize = 64;
+constexpr std::size_t kMostSize = std::size_t{1} << 20U;
+constexpr std::size_t kClasses = std::bit_width(kMostSize / kLeastSize);
 
 class SizeClass {
  public:
@@ -41,7 +41,7 @@ class SizeClass {
   LeftOver *first_ REDAG_GUARDED_BY(lock_) = nullptr;
 };
 
-std::size_t class_of(std::size_t size) { return std::bit_width((std::max(size, kLeast) - 1) / kLeast); }
+std::size_t class_of(std::size_t size) { return std::bit_width((std::max(size, kLeastSize) - 1) / kLeastSize); }
 
 // Never destroyed: an executor with static storage gives frames back when the process ends.
 SizeClass &size_class(std::size_t number) {
@@ -52,14 +52,14 @@ SizeClass &size_class(std::size_t number) {
 }  // namespace
 
 void *take_storage(std::size_t size) {
-  if (size > kMost) return ::operator new(size);
+  if (size > kMostSize) return ::operator new(size);
   const std::size_t number = class_of(size);
   if (void *const storage = size_class(number).take()) return storage;
-  return ::operator new(kLeast << number);
+  return ::operator new(kLeastSize << number);
 }
 
 void give_back_storage(void *storage, std::size_t size) noexcept {
-  if (size > kMost) return ::operator delete(storage);
+  if (size > kMostSize) return ::operator delete(storage);
   size_class(class_of(size)).give_back(storage);
 }
 
