@@ -26,7 +26,7 @@ struct Combination {
 class Conformance : public ::testing::TestWithParam<Combination> {
  protected:
   template <class Driver>
-  void check(std::uint64_t workloads, bool with_waits) {
+  void check(std::uint64_t workloads) {
     const std::uint64_t first = from_environment("REDAG_SEED").value_or(1);
     const std::uint64_t count = from_environment("REDAG_WORKLOADS").value_or(workloads);
     for (std::uint64_t seed = first; seed < first + count; ++seed) {
@@ -34,7 +34,7 @@ class Conformance : public ::testing::TestWithParam<Combination> {
       Rng rng(seed);
       spec.workload = contended(rng);
       spec.workload.policy = GetParam().policy;
-      if (with_waits && seed % 3 == 0) add_waits(rng, spec.workload);
+      if (seed % 3 == 0) add_waits(rng, spec.workload);
       spec.preemption = GetParam().preemption;
       spec.horizon = 200 * kMillisecond;
       spec.seed = seed;
@@ -50,10 +50,10 @@ TEST_P(Conformance, Threads) {
   const bool os = GetParam().preemption == sched::Preemption::Full;
   if (os && !is_static(GetParam().policy)) GTEST_SKIP() << "os preemption needs a static policy";
   if (os && runtime::probe_priority_band().top_job == 0) GTEST_SKIP() << "no real-time rights";
-  check<ThreadsDriver>(4, false);
+  check<ThreadsDriver>(4);
 }
-TEST_P(Conformance, Simulator) { check<SimulatorDriver>(400, true); }
-TEST_P(Conformance, ManualWorkers) { check<ManualDriver>(400, true); }
+TEST_P(Conformance, Simulator) { check<SimulatorDriver>(400); }
+TEST_P(Conformance, ManualWorkers) { check<ManualDriver>(400); }
 
 std::vector<Combination> combinations() {
   std::vector<Combination> all;

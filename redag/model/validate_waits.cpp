@@ -81,7 +81,8 @@ void check_waits(const Workload &workload, const Task &task, bool allowed, Findi
   if (!allowed) {
     findings.error(
         Field::Segments, {}, fmt::format("task '{}' has segments, which cannot be handled here", task.name),
-        "'redag simulate' knows them, with the executor 'redag'; elsewhere, state 'wcet:' in place of 'segments:'");
+        "'redag simulate' and 'redag run' know them, with the executor 'redag'; elsewhere, state 'wcet:' in place of "
+        "'segments:'");
   }
   if (task.waits.size() > kMaxWaits) {
     findings.error(

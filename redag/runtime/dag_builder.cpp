@@ -21,14 +21,14 @@ DagBuilder::DagBuilder(std::string name, const DagOptions &options) {
   dag_.degrade = options.degrade;
 }
 
-TaskHandle DagBuilder::timer(std::string name, nanoseconds period, Function body, const TaskOptions &options) {
+TaskHandle DagBuilder::timer(std::string name, nanoseconds period, TaskBody body, const TaskOptions &options) {
   Task task;
   task.name = std::move(name);
   task.period = period.count();
   return append(std::move(task), "timer", options.after, std::move(body), options);
 }
 
-TaskHandle DagBuilder::data(std::string name, const std::vector<TaskHandle> &predecessors, Function body,
+TaskHandle DagBuilder::data(std::string name, const std::vector<TaskHandle> &predecessors, TaskBody body,
                             const TaskOptions &options) {
   Task task;
   task.name = std::move(name);
@@ -41,7 +41,7 @@ TaskHandle DagBuilder::data(std::string name, const std::vector<TaskHandle> &pre
   return append(std::move(task), "data", predecessors, std::move(body), options);
 }
 
-EventHandle DagBuilder::event(std::string name, nanoseconds min_interval, Function body, const TaskOptions &options) {
+EventHandle DagBuilder::event(std::string name, nanoseconds min_interval, TaskBody body, const TaskOptions &options) {
   const std::string place = place_of(dag_.name, "event", name);
   if (!options.after.empty()) {
     throw std::invalid_argument(place + ": TaskOptions::after applies to timer() only (events have no predecessors)");
@@ -64,7 +64,7 @@ Dag DagBuilder::dag() const {
   return dag;
 }
 
-TaskHandle DagBuilder::append(Task task, const char *call, const std::vector<TaskHandle> &predecessors, Function body,
+TaskHandle DagBuilder::append(Task task, const char *call, const std::vector<TaskHandle> &predecessors, TaskBody body,
                               const TaskOptions &options) {
   const auto refuse = [&](const char *why) {
     throw std::invalid_argument(place_of(dag_.name, call, task.name) + ": " + why);

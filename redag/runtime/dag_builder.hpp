@@ -5,14 +5,18 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "redag/model/workload.hpp"
+#include "redag/runtime/coroutine.hpp"
 
 namespace redag::runtime {
 
@@ -74,36 +78,59 @@ struct TaskOptions {
   EarlyRelease early = EarlyRelease::Skip;  // for event()
 };
 
+/// The body of a task: a function, or one that returns redag::Coroutine, whose jobs can wait without a worker. It is
+/// kept until the last job of its task has ended: a coroutine may use what its lambda has captured.
+class TaskBody {
+ public:
+  TaskBody() = default;
+  TaskBody(std::nullptr_t /*none*/) {}  // NOLINT(google-explicit-constructor)
+  template <class F>
+  requires(!std::is_same_v<std::remove_cvref_t<F>, TaskBody> && std::is_invocable_v<F &>)
+      TaskBody(F &&body) {  // NOLINT(google-explicit-constructor): functions are passed as bodies
+    if constexpr (std::is_same_v<std::invoke_result_t<F &>, Coroutine>) {
+      coroutine_ = std::forward<F>(body);
+    } else {
+      function_ = std::forward<F>(body);
+    }
+  }
+
+  /// Returns true if there is a function.
+  [[nodiscard]] explicit operator bool() const { return function_ || coroutine_; }
+
+ private:
+  friend class Executor;
+  std::function<void()> function_;
+  std::function<Coroutine()> coroutine_;
+};
+
 /// timer(), data() and event() throw std::invalid_argument for a task without a body, for a predecessor that is no task
 /// of this DagBuilder, and for an option that does not apply. Executor::add() knows the policy. It finds all other
 /// mistakes and reports all of them.
 class DagBuilder {
  public:
-  using Function = std::function<void()>;
-
   explicit DagBuilder(std::string name, const DagOptions &options = {});
 
   /// Adds a task that is released every `period`.
-  TaskHandle timer(std::string name, nanoseconds period, Function body, const TaskOptions &options = {});
+  TaskHandle timer(std::string name, nanoseconds period, TaskBody body, const TaskOptions &options = {});
 
   /// Adds a task that is released when every predecessor has completed once more.
-  TaskHandle data(std::string name, const std::vector<TaskHandle> &predecessors, Function body,
+  TaskHandle data(std::string name, const std::vector<TaskHandle> &predecessors, TaskBody body,
                   const TaskOptions &options = {});
 
   /// Adds a task whose jobs the program releases with Executor::release(), from any thread: a sporadic task. In the
   /// model it is a timer task whose period is `min_interval`, the minimum inter-arrival time.
-  EventHandle event(std::string name, nanoseconds min_interval, Function body, const TaskOptions &options = {});
+  EventHandle event(std::string name, nanoseconds min_interval, TaskBody body, const TaskOptions &options = {});
 
   /// The DAG as a value, with the periods and deadlines that tasks inherit: for analysis and for workload files.
   [[nodiscard]] Dag dag() const;
 
  private:
   friend class Executor;
-  TaskHandle append(Task task, const char *call, const std::vector<TaskHandle> &predecessors, Function body,
+  TaskHandle append(Task task, const char *call, const std::vector<TaskHandle> &predecessors, TaskBody body,
                     const TaskOptions &options);
 
   Dag dag_;
-  std::vector<Function> bodies_;
+  std::vector<TaskBody> bodies_;
   std::vector<std::uint64_t> serials_;                 // of the tasks
   std::vector<std::shared_ptr<EventSource>> sources_;  // of the tasks; null: not event()
 };

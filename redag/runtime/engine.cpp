@@ -33,7 +33,9 @@ Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions option
       pool_(os() ? options_.config.max_started : options_.config.workers, options_.trace_capacity),
       tasks_(options_.measure),
       lookout_(posts_silently() ? std::make_unique<HelperThread>() : nullptr),
-      placement_(pool_, os(), options_.band, lookout_ ? &lookout_->parker : nullptr),
+      devices_(options_.devices),
+      waiting_(devices_),
+      placement_(pool_, waiting_, os(), options_.band, lookout_ ? &lookout_->parker : nullptr),
       paused_(options_.start_paused),
       decisions_(options_.trace_capacity) {
   const sched::Config &config = options_.config;
@@ -73,7 +75,7 @@ Result<void> Engine::start() {
   }
   const Time at = now();
   Locked locked(*this);
-  withdraw_if_halting();
+  withdraw_if_halting(locked);
   if (cpus.empty()) cpus = usable;
   placement_.start(std::min(cpus.size(), usable.size()));
   if (guard_) guard_->start(cpus);
@@ -164,10 +166,12 @@ void Engine::join() {
   {
     // A decision that was under way has posted its jobs. No later one starts a job.
     Locked locked(*this);
-    withdraw_if_halting();
+    withdraw_if_halting(locked);
     pool_.forget_processors();
   }
+  if (lets_wait_) static_cast<void>(wait_idle(kNever));  // a job that waits has no thread that would end after it
   end_threads();
+  if (lets_wait_) end_waits();
 }
 
 // The throttling guard: sleeps until a job is in progress, then checks several times a second while there are jobs.
@@ -227,6 +231,7 @@ void Engine::carry_out(Locked &locked, const sched::Step &step, Time now, Taker 
   }
   if (options_.config.preemption == sched::Preemption::Cooperative) refresh_outranked();
   if (guards) guard_->note(now);
+  if (waiting_.has_cancelled()) wake_cancelled(locked, now);
 }
 
 void Engine::report(Locked &locked, std::span<const JobEvent> events) {
@@ -263,7 +268,7 @@ void Engine::release(TaskId task, Time nominal) { release(Release{task, nominal}
 
 void Engine::release_at(std::span<const Release> releases, Time at) {
   Locked locked(*this, releases.size());
-  withdraw_if_halting();
+  withdraw_if_halting(locked);
   if (halted_at_ != kNever) return;
   do {
     const auto lot = releases.first(std::min(releases.size(), sched::kMostReleasesAtOnce));
@@ -276,7 +281,7 @@ void Engine::release_at(std::span<const Release> releases, Time at) {
 void Engine::miss(TaskId task, Time nominal, Reason reason) {
   const Time at = now();
   Locked locked(*this);
-  withdraw_if_halting();
+  withdraw_if_halting(locked);
   if (halted_at_ != kNever) return;
   scheduler_->miss(task, nominal, at, reason);
   decide(locked, at);
@@ -294,7 +299,7 @@ void Engine::pause() {
 void Engine::resume() {
   const Time at = now();
   Locked locked(*this);
-  withdraw_if_halting();
+  withdraw_if_halting(locked);
   paused_ = false;
   if (pause_waiters_ > 0) wake_pause_waiters();
   decide(locked, at);
@@ -327,7 +332,7 @@ bool Engine::run_one() {
   {
     const Time at = now();
     Locked locked(*this);
-    withdraw_if_halting();
+    withdraw_if_halting(locked);
     REDAG_CHECK(paused_, "run_one() is for a paused engine");
     REDAG_CHECK(pool_.caller().stack.empty(), "one run_one() at a time");
     decide(locked, at, &taker);
@@ -341,8 +346,8 @@ bool Engine::run_one() {
 // ---- the end ----
 
 // The first thread to take the lock after halt() skips the jobs that have not started. These skips are the engine's,
-// not the model's: they are not recorded, and the jobs count as in flight.
-void Engine::withdraw() {
+// not the model's: they are not recorded, and the jobs count as in flight. Jobs that wait are woken.
+void Engine::withdraw(Locked &locked) {
   halted_at_ = now();
   scheduler_->close(halted_at_);
   const sched::Step step = scheduler_->dispatch(halted_at_);
@@ -350,12 +355,14 @@ void Engine::withdraw() {
     if (event.kind == JobEventKind::Skipped) ++tasks_[event.task].withdrawn;
   }
   REDAG_CHECK(step.dispatches.empty(), "a job was started after the end");
+  waiting_.cancel_all();
+  if (waiting_.has_cancelled()) wake_cancelled(locked, halted_at_);
 }
 
 bool Engine::wait_idle(Time deadline) {
   {
     Locked locked(*this);
-    withdraw_if_halting();
+    withdraw_if_halting(locked);
     REDAG_CHECK(halted_at_ != kNever, "wait_idle() is for after halt()");
     if (placement_.unfinished() == 0) return true;
   }
@@ -390,6 +397,7 @@ std::vector<Job> Engine::started() const {
   std::vector<Job> jobs;
   for (const auto &thread : pool_.threads()) jobs.insert(jobs.end(), thread->stack.begin(), thread->stack.end());
   jobs.insert(jobs.end(), pool_.caller().stack.begin(), pool_.caller().stack.end());
+  waiting_.for_each([&](const WaitingJob &waiting) { jobs.push_back(waiting.job); });
   return jobs;
 }
 

@@ -25,8 +25,10 @@
 #include "redag/base/result.hpp"
 #include "redag/base/thread_annotations.hpp"
 #include "redag/runtime/clock.hpp"
+#include "redag/runtime/device_threads.hpp"
 #include "redag/runtime/event_merge.hpp"
 #include "redag/runtime/executor_options.hpp"
+#include "redag/runtime/in_progress.hpp"
 #include "redag/runtime/job_body.hpp"
 #include "redag/runtime/job_placement.hpp"
 #include "redag/runtime/miss_log.hpp"
@@ -35,6 +37,7 @@
 #include "redag/runtime/setup.hpp"
 #include "redag/runtime/task_table.hpp"
 #include "redag/runtime/throttling_guard.hpp"
+#include "redag/runtime/waiting_jobs.hpp"
 #include "redag/runtime/worker_pool.hpp"
 #include "redag/sched/scheduler.hpp"
 #include "redag/trace/ring.hpp"
@@ -64,6 +67,9 @@ struct EngineOptions {
   // none, cooperative: how many spins a thread without a job makes before it sleeps; see spins_in().
   std::uint32_t spins = 0;
   std::size_t touched_stack = 0;  // bytes of each worker thread's stack; see ThreadSetup
+  std::vector<Device> devices;    // those with which the scheduler was built
+  // SCHED_FIFO priority of the threads that wake jobs and serve them at devices; 0: ordinary threads.
+  int waits_priority = 0;
 };
 
 /// A job that is overdue and has not ended.
@@ -124,6 +130,10 @@ class Engine {
   /// be. An engine that only uses run_one() needs no start().
   [[nodiscard]] Result<void> start();
 
+  /// Creates the threads that jobs with waits need: one that wakes sleepers, and one for each slot of a device. Call it
+  /// before such jobs are released. Later calls do nothing. Error: as start(); it can be called again.
+  [[nodiscard]] Result<void> let_wait();
+
   /// Lets an idle thread wait in the place of the release thread (its leader). Call it before start(). `thread` must
   /// live until join() has returned. With realtime_threads it has no effect: an idle thread is not above busy ones.
   void share_releases(ReleaseThread &thread) { releases_ = options_.realtime_threads ? nullptr : &thread; }
@@ -142,6 +152,8 @@ class Engine {
   void release(TaskId task, Time nominal);
   /// As above, for a caller that has just read now(): the job arrives at `at`.
   void release(const Release &release, Time at) { release_at(std::span(&release, 1), at); }
+  /// Reports that what the job in this slot waits for has happened. From any thread.
+  void wake(JobSlot job);
   /// Reports a release that is skipped at once for `reason` (sched::Scheduler::miss).
   void miss(TaskId task, Time nominal, Reason reason);
 
@@ -167,7 +179,7 @@ class Engine {
   void resume();
   /// Starts the most urgent eligible job if a worker is free for it, and runs it to its end on the calling thread, at
   /// that thread's priority. A preemption point in the job only checks its budget. Returns false if there is no such
-  /// job. Requires pause(), and that no other run_one() is in progress.
+  /// job. Requires pause(), and that no other run_one() is in progress. Not for jobs that wait.
   bool run_one();
 
   /// No job starts from now on; started jobs continue. Jobs that were released and have not started stay in flight.
@@ -179,7 +191,7 @@ class Engine {
   /// Jobs that have started and not ended.
   [[nodiscard]] std::vector<Job> started() const;
   /// Between start() and join(): replaces `out` by the jobs on the threads, by thread, the topmost one last. For
-  /// observers that look from time to time; leaves out the job of run_one().
+  /// observers that look from time to time; leaves out the job of run_one(), and those that wait.
   void started(std::vector<StartedJob> &out) const;
   /// Calls halt(), and ends the threads once all started jobs have ended. Not from a body.
   void join();
@@ -233,7 +245,13 @@ class Engine {
   void look_out() noexcept;
   void run(Taker &taker, Time at) noexcept;
   Time run_next(Taker &taker, RunningJob &running, Time at, Body &doomed) noexcept;
-  sched::Outcome call(const Assignment &assignment);
+  sched::Outcome call(const Assignment &assignment, RunningJob &running);
+  void end_waits();
+  std::optional<Time> suspend(Taker &taker, RunningJob &running);
+  Time wake_sleepers();
+  void end_service(DeviceThread &thread, JobSlot job);
+  void wake(Locked &locked, JobSlot job, Time at) REDAG_REQUIRES(lock_);
+  void wake_cancelled(Locked &locked, Time at) REDAG_REQUIRES(lock_);
   Time finish(Taker &taker, RunningJob &running, sched::Outcome outcome, Body &doomed);
   void count_late(const Job &job, TaskEntry &entry, Time at) REDAG_REQUIRES(lock_);
   void note_misses(Locked &locked, const Job &job, const TaskEntry &entry, Time at, sched::Outcome outcome)
@@ -252,10 +270,10 @@ class Engine {
                      std::shared_ptr<SkipListener> listener = nullptr) REDAG_REQUIRES(lock_);
   void register_dag(DagId id, const Dag &dag, std::span<const TaskId> ids, std::span<Body> bodies)
       REDAG_REQUIRES(lock_);
-  void withdraw_if_halting() REDAG_REQUIRES(lock_) {
-    if (halting() && halted_at_ == kNever) withdraw();
+  void withdraw_if_halting(Locked &locked) REDAG_REQUIRES(lock_) {
+    if (halting() && halted_at_ == kNever) withdraw(locked);
   }
-  void withdraw() REDAG_REQUIRES(lock_);
+  void withdraw(Locked &locked) REDAG_REQUIRES(lock_);
   void wake_pause_waiters() REDAG_REQUIRES(lock_);
   void end_of_jobs() REDAG_REQUIRES(lock_);
   /// Returns true if the throttling guard sees each decision.
@@ -278,6 +296,8 @@ class Engine {
   TaskTable tasks_ REDAG_GUARDED_BY(lock_);
   std::vector<Duration> dag_deadlines_ REDAG_GUARDED_BY(lock_);  // of add_dag(), by DagId
   const std::unique_ptr<HelperThread> lookout_;                  // several ordinary threads
+  DeviceThreads devices_;
+  WaitingJobs waiting_ REDAG_GUARDED_BY(lock_);
   JobPlacement placement_ REDAG_GUARDED_BY(lock_);
   std::optional<ThrottlingGuard> guard_ REDAG_GUARDED_BY(lock_);  // os, throttled
   bool running_ REDAG_GUARDED_BY(lock_) = false;                  // the threads have been started
@@ -290,6 +310,11 @@ class Engine {
   Event idle_event_;
   std::unique_ptr<HelperThread> guard_thread_;  // os, throttled
   ReleaseThread *releases_ = nullptr;
+  bool lets_wait_ = false;  // let_wait() has succeeded
+  // let_wait(): wakes jobs that sleep.
+  std::unique_ptr<ReleaseThread> sleepers_;
+  // let_wait(): calls of wake() that may still touch this engine although the woken job has ended.
+  std::shared_ptr<InProgress> wakes_;
   Atomic<Time> origin_{kNever};
   Atomic<bool> halting_{false};
   std::atomic<bool> has_listeners_{false};  // a task has or had a listener; written under the lock

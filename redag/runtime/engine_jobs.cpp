@@ -7,6 +7,7 @@
 
 #include "redag/base/check.hpp"
 #include "redag/runtime/clock.hpp"
+#include "redag/runtime/coroutine_body.hpp"
 #include "redag/runtime/engine.hpp"
 #include "redag/runtime/engine_locked.hpp"
 #include "redag/runtime/preemption_point.hpp"
@@ -18,6 +19,22 @@
 namespace redag::runtime {
 
 using sched::Outcome;
+
+namespace {
+
+/// The job goes on after a wait.
+void restore(RunningJob &running, WaitingJob &job) {
+  running.waiting = &job;
+  running.used_wcet_low = job.used_wcet_low;
+  running.used_budget = job.used_budget;
+  running.limit = job.entry->next_limit(running);
+  running.reported = job.reported;
+  running.begun = job.begun;
+  running.before = job.charged;
+  running.earlier = job.earlier;
+}
+
+}  // namespace
 
 const RunningJob *Engine::current_job() const noexcept {
   const RunningJob *job = RunningJob::current();
@@ -53,7 +70,7 @@ void Engine::run(Taker &taker, Time at) noexcept {
     if (is_traced) self.events.push(event);
     if (tap != nullptr) tap->event(this, event);
   };
-  if (is_traced || tap != nullptr) {
+  if ((is_traced || tap != nullptr) && assignment.woken == nullptr) {
     const Time begun = now();
     tell(JobEventKind::Started, begun, begun);
   }
@@ -62,33 +79,44 @@ void Engine::run(Taker &taker, Time at) noexcept {
   running.origin = job.origin;
   running.limit = assignment.entry->first_limit;
   running.measured = assignment.measured;
-  running.used_wcet_low = running.used_budget = running.reported = false;
+  running.used_wcet_low = running.used_budget = running.reported = running.cancelled = false;
+  running.before = running.earlier = 0;
+  running.waiting = nullptr;
+  running.wait = nullptr;
   running.ended = kNever;
   if (self.meter.needs_reading(at, !assignment.expected_short)) {
     self.meter.set(thread_cpu_now(), at);
     at = now();
   }
-  running.begun = at;
+  running.begun = running.here_since = at;
   running.start = self.meter.start();
+  if (assignment.woken != nullptr) restore(running, *assignment.woken);
   RunningJob::set_current(&running);
   running.enter();
-  const Outcome outcome = call(assignment);
+  Outcome outcome = call(assignment, running);
   if (running.ended == kNever) running.end();
   RunningJob::set_current(running.below);
   if (running.start.exact && !running.on_trust) {
-    self.meter.set(running.start.cpu + running.charged, running.ended);
+    self.meter.set(running.start.cpu + running.charged - running.before, running.ended);
   } else {
     self.meter.pass();
+  }
+  if (running.wait != nullptr) {
+    if (const std::optional<Time> next = suspend(taker, running)) return *next;
+    outcome = Outcome::BudgetExceeded;
   }
   if (is_traced || tap != nullptr) tell(JobEventKind::Executed, running.ended, running.charged);
   return finish(taker, running, outcome, doomed);
 }
 
-inline Outcome Engine::call(const Assignment &assignment) {
+inline Outcome Engine::call(const Assignment &assignment, RunningJob &running) {
   try {
-    return assignment.entry->body(assignment.job);
+    return assignment.woken == nullptr ? assignment.entry->body(assignment.job) : go_on(running);
   } catch (const BudgetExceeded &) {
     return Outcome::BudgetExceeded;
+  } catch (const WaitCancelled &) {
+    running.cancelled = true;
+    return Outcome::Threw;
   } catch (...) {
     if (options_.on_exception) options_.on_exception(assignment.job, std::current_exception());
     return Outcome::Threw;
@@ -111,12 +139,13 @@ inline Outcome Engine::call(const Assignment &assignment) {
   bool delayed = false;
   {
     Locked locked(*this, &delayed);
-    withdraw_if_halting();
-    entry.count(running.charged, at - running.begun);
-    self.used += running.charged;
+    withdraw_if_halting(locked);
+    entry.count(running.charged, running.earlier + at - running.here_since);
+    self.used += running.charged - running.before;
     if (finished && response > entry.deadline) count_late(job, entry, at);
     if (finished && end_to_end > entry.dag_deadline) ++entry.late_end_to_end;
-    if (options_.misses != nullptr) note_misses(locked, job, entry, at, outcome);
+    if (running.cancelled) ++entry.cancelled;
+    if (options_.misses != nullptr && !running.cancelled) note_misses(locked, job, entry, at, outcome);
     --entry.busy;
     if (entry.removed && entry.busy == 0) doomed.swap(entry.body);
     if (running.charged > running.limit) {
@@ -182,14 +211,14 @@ void RunningJob::close() noexcept {
 inline void RunningJob::end() noexcept {
   leave();
   ended = engine->now();
-  const Duration took = ended - begun;
+  const Duration took = ended - here_since;
   on_trust = took <= CpuMeter::kShort && !measured;
-  charged = on_trust ? took : cpu_time();
+  charged = before + (on_trust ? took : stretch_cpu_time());
 }
 
-Duration RunningJob::cpu_time() const noexcept {
+Duration RunningJob::stretch_cpu_time() const noexcept {
   const Duration used = thread_cpu_now() - start.cpu;
-  return start.exact ? used : std::min(used, engine->now() - begun);
+  return start.exact ? used : std::min(used, engine->now() - here_since);
 }
 
 void RunningJob::reach_preemption_point() { engine->preemption_point(*this); }
@@ -200,7 +229,7 @@ void RunningJob::reach_limit(Duration used) { engine->reach_limit(*this, used); 
 void Engine::reach_limit(RunningJob &job, Duration used) {
   const Time at = now();
   Locked locked(*this);
-  withdraw_if_halting();
+  withdraw_if_halting(locked);
   const TaskEntry &entry = tasks_[job.task];
   const bool cut_off = entry.cuts_off && entry.budget > 0 && used > entry.budget;
   job.used_budget = job.used_budget || cut_off;
@@ -236,7 +265,7 @@ void Engine::watch(const WatchLimits &limits, Time as_of, std::vector<OverdueJob
   constexpr Duration kSlack = 10 * kMicrosecond;
   const Time at = now();
   Locked locked(*this);
-  withdraw_if_halting();
+  withdraw_if_halting(locked);
   bool told = false;
   for (const auto &thread : pool_.threads()) {
     RunningJob *running = thread->stack.empty() ? nullptr : thread->top.load(std::memory_order_acquire);
@@ -249,7 +278,7 @@ void Engine::watch(const WatchLimits &limits, Time as_of, std::vector<OverdueJob
     const Duration limit = entry.next_limit(*running);
     if (!overdue && (limit == kNever || elapsed <= limit)) continue;
     // For a task with limits the start is exact. For others, `used` only serves the report.
-    const Duration used = cpu_now(thread->cpu_clock) - running->start.cpu;
+    const Duration used = running->before + cpu_now(thread->cpu_clock) - running->start.cpu;
     if (thread->top.load(std::memory_order_acquire) != running) continue;  // it has ended and waits for the lock
     if (used - kSlack > limit) told = tell_limits(*running, used - kSlack, at, true) || told;
     if (!overdue) continue;
@@ -257,6 +286,12 @@ void Engine::watch(const WatchLimits &limits, Time as_of, std::vector<OverdueJob
     ++entry.usage.overdue;
     out.push_back(OverdueJob{job, elapsed, used});
   }
+  waiting_.for_each([&](WaitingJob &waiting) {
+    if (waiting.reported || !waiting.entry->is_overdue(as_of - waiting.begun, limits)) return;
+    waiting.reported = true;
+    ++waiting.entry->usage.overdue;
+    out.push_back(OverdueJob{waiting.job, as_of - waiting.begun, waiting.charged});
+  });
   if (told) decide(locked, at);
 }
 
@@ -265,13 +300,13 @@ void Engine::preemption_point(RunningJob &job) {
   const Time at = now();
   {
     Locked locked(*this);
-    withdraw_if_halting();
+    withdraw_if_halting(locked);
     if (!scheduler_->outranked(job.slot)) return;
     scheduler_->preemption_point(job.slot, at);
     decide(locked, at, &taker);
   }
   if (taker.next.kind != Next::Kind::Start) return;
-  const Duration used = job.cpu_time();
+  const Duration used = job.stretch_cpu_time();
   taker.thread.meter.pass();
   run(taker, at);
   REDAG_CHECK(taker.next.kind == Next::Kind::Resume, "a suspended job was not resumed");

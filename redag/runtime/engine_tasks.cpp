@@ -28,7 +28,7 @@ AddedDag Engine::add_dag(const Dag &dag, std::vector<Body> bodies) {
   REDAG_CHECK(bodies.size() == dag.tasks.size(), "every task needs a body");
   const Time at = now();
   Locked locked(*this);
-  withdraw_if_halting();
+  withdraw_if_halting(locked);
   AddedDag added;
   added.dag = scheduler_->add_dag(dag, at);
   const std::span<const TaskId> tasks = scheduler_->tasks_of(added.dag);
@@ -44,7 +44,7 @@ TaskId Engine::add_task(DagId dag, std::uint32_t rank, const Task &task, Body bo
                         std::shared_ptr<SkipListener> listener) {
   const Time at = now();
   Locked locked(*this);
-  withdraw_if_halting();
+  withdraw_if_halting(locked);
   const TaskId id = scheduler_->add_task(dag, rank, task, at);
   // Its jobs can carry older data. Only the caller knows what follows the task.
   const TaskRole role{.dag = dag,
@@ -61,7 +61,7 @@ void Engine::remove_dag(DagId dag) {
   std::vector<Body> doomed;  // destroyed without the lock: destructors are the user's code
   const Time at = now();
   Locked locked(*this);
-  withdraw_if_halting();
+  withdraw_if_halting(locked);
   REDAG_CHECK(dag.value < scheduler_->dag_slots(), "removal of a DAG that does not exist");
   for (const TaskId task : scheduler_->tasks_of(dag)) tasks_.remove(task, doomed);
   scheduler_->remove_dag(dag, at);
@@ -72,7 +72,7 @@ void Engine::remove_task(TaskId task) {
   std::vector<Body> doomed;
   const Time at = now();
   Locked locked(*this);
-  withdraw_if_halting();
+  withdraw_if_halting(locked);
   tasks_.remove(task, doomed);
   scheduler_->remove_task(task, at);
   decide(locked, at);
@@ -81,7 +81,7 @@ void Engine::remove_task(TaskId task) {
 void Engine::set_timing(TaskId task, Duration period, Duration deadline) {
   const Time at = now();
   Locked locked(*this);
-  withdraw_if_halting();
+  withdraw_if_halting(locked);
   scheduler_->set_timing(task, period, deadline, at);
   tasks_[task].deadline = deadline;
   decide(locked, at);
@@ -108,12 +108,14 @@ void Engine::register_task(TaskId id, const Task &task, const TaskRole &role, Bo
   tasks_.add(id, task, role, body, std::move(listener));
   if (const trace::Tap *const tap = trace::tap(); tap != nullptr) tap->task(this, id, role.dag, task);
   for (const auto &thread : pool_.threads()) thread->stack.reserve(tasks_.most_started());
+  waiting_.reserve(tasks_.most_started());
 }
 
 sched::Accounting Engine::accounting(TaskId task) const {
   const LockGuard guard(lock_);
   sched::Accounting accounting = scheduler_->accounting(task);
   accounting.skipped -= tasks_[task].withdrawn;
+  accounting.aborted -= tasks_[task].cancelled;
   return accounting;
 }
 
@@ -135,6 +137,7 @@ TaskFigures Engine::figures(TaskId task) const {
                       .response = entry.response,
                       .end_to_end = entry.end_to_end};
   figures.jobs.skipped -= entry.withdrawn;
+  figures.jobs.aborted -= entry.cancelled;
   return figures;
 }
 

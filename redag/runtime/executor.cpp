@@ -73,7 +73,11 @@ Executor::Impl::Impl(ExecutorOptions options) : options_(std::move(options)) {
   engine.spins = spins_before_sleep(setup_, options_.spin.count());
   if (options_.lock_memory) engine.touched_stack = kTouchedStack;
   engine.on_exception = [this](const Job &job, std::exception_ptr e) { on_exception(job, std::move(e)); };
-  auto scheduler = std::make_unique<sched::PriorityScheduler>(Workload{}, engine.config);
+  engine.devices = options_.devices;
+  engine.waits_priority = setup_.timer_priority();
+  Workload empty;
+  empty.platform.devices = options_.devices;
+  auto scheduler = std::make_unique<sched::PriorityScheduler>(empty, engine.config);
   engine_ = std::make_unique<Engine>(std::move(scheduler), std::move(engine));
   timer_ = std::make_unique<ReleaseTimer>([this](auto releases) { engine_->release(releases); }, 0);
   engine_->share_releases(timer_->thread());
@@ -331,6 +335,7 @@ std::uint64_t Executor::lost_events() const { return impl_->engine().lost_events
 std::uint64_t Executor::thread_waits() const { return impl_->engine().thread_waits(); }
 std::vector<TaskStats> Executor::stats(DagId dag) const { return impl_->stats(dag).tasks; }
 DagStats Executor::dag_stats(DagId dag) const { return impl_->stats(dag); }
+DeviceHandle Executor::device(std::string_view name) const { return impl_->device(name); }
 std::string Executor::task_name(TaskId task) const { return impl_->task_name(task); }
 
 }  // namespace redag::runtime

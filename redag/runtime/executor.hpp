@@ -14,11 +14,13 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "redag/base/ids.hpp"
 #include "redag/model/job_event.hpp"
 #include "redag/runtime/dag_builder.hpp"
+#include "redag/runtime/device_handle.hpp"
 #include "redag/runtime/executor_options.hpp"
 #include "redag/runtime/stats.hpp"
 #include "redag/sched/config.hpp"
@@ -41,11 +43,16 @@ class Executor {
 
   /// Adds a DAG before or during the run. Its release grid begins at the start of the run, or now. Throws
   /// std::invalid_argument with all mistakes of the DAG, also if its name is taken. Throws AdmissionRefused with the
-  /// reason if `admission` refuses it. Changes nothing if it throws. Ids of DAGs are not used again.
+  /// reason if `admission` refuses it, and std::runtime_error if it is the first one with a Coroutine and the system
+  /// refuses a thread. Changes nothing if it throws. Ids of DAGs are not used again.
   DagId add(DagBuilder dag);
   /// Skips jobs that have not started. Started jobs end as usual, and a body is destroyed once it no longer runs. A
   /// second call does nothing. Throws std::out_of_range if there has been no such DAG.
   void remove(DagId dag);
+
+  /// A device of ExecutorOptions::devices, for bodies that wait (docs/runtime.md, "Bodies that wait"). Throws
+  /// std::out_of_range if there is none of this name. Bodies must not outlive the executor with it.
+  [[nodiscard]] DeviceHandle device(std::string_view name) const;
 
   /// Releases a job of a task that DagBuilder::event() added, now. All rules for releases hold: overrun, max_pending,
   /// max_active, HI mode. Returns false if no job is released, because the minimum inter-arrival time has not passed

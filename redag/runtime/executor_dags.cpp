@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "redag/runtime/coroutine_body.hpp"
 #include "redag/runtime/dag_mistakes.hpp"
 #include "redag/runtime/distribution_content.hpp"
 #include "redag/runtime/executor_impl.hpp"
@@ -36,19 +37,25 @@ void state_wcet(Task &task, Duration longest) {
 
 }  // namespace
 
-DagId Executor::Impl::add(Dag dag, std::vector<DagBuilder::Function> functions, Sources sources) {
+DagId Executor::Impl::add(Dag dag, std::vector<TaskBody> task_bodies, Sources sources) {
   inherit_periods(dag);
   const std::vector<bool> is_event = events_among(sources);
   if (const std::string mistakes = mistakes_of(dag, is_event, options_.policy); !mistakes.empty()) {
     refuse("Executor::add(): " + mistakes);
   }
 
+  bool has_coroutines = false;
   std::vector<Body> bodies;
-  for (DagBuilder::Function &body : functions) {
-    bodies.emplace_back([function = std::move(body)](const Job &) {
-      function();
-      return sched::Outcome::Finished;
-    });
+  for (TaskBody &body : task_bodies) {
+    if (body.coroutine_) {
+      has_coroutines = true;
+      bodies.push_back(coroutine_body([make = std::move(body.coroutine_)](const Job &) { return make(); }));
+    } else {
+      bodies.emplace_back([function = std::move(body.function_)](const Job &) {
+        function();
+        return sched::Outcome::Finished;
+      });
+    }
   }
   const LockGuard guard(lock_);
   const auto has_name = [&](const auto &added) { return !added.second.removed && added.second.dag.name == dag.name; };
@@ -62,6 +69,9 @@ DagId Executor::Impl::add(Dag dag, std::vector<DagBuilder::Function> functions, 
            ": this event is in an executor already (remove() its DAG there first, or build another one)");
   }
   if (options_.admission) admit(dag);
+  if (has_coroutines) {
+    if (const Result<void> ready = engine_->let_wait(); !ready) throw std::runtime_error(to_string(ready.error()));
+  }
   const DagId id(next_dag_);
   const Time now = running_ ? std::max<Time>(0, engine_->now()) : 0;
   Added added{.dag = dag,
@@ -98,7 +108,8 @@ void Executor::Impl::own(DagId dag, const std::vector<TaskId> &tasks, Time since
 Workload Executor::Impl::workload() const {
   Workload workload;
   workload.name = options_.name;
-  workload.platform = Platform{options_.workers, setup_.mode.mode};
+  workload.platform =
+      Platform{.workers = options_.workers, .preemption = setup_.mode.mode, .devices = options_.devices};
   workload.policy = options_.policy;
   workload.ties = options_.ties;
   return workload;
@@ -173,6 +184,14 @@ DagStats Executor::Impl::stats(DagId dag) const {
         .task = name, .late = figures.late_end_to_end, .end_to_end = distribution_of(figures.end_to_end.get())});
   }
   return stats;
+}
+
+DeviceHandle Executor::Impl::device(std::string_view name) const {
+  for (std::size_t d = 0; d < options_.devices.size(); ++d) {
+    if (options_.devices[d].name == name) return {*engine_, DeviceId(d)};
+  }
+  throw std::out_of_range(
+      fmt::format("Executor::device(): there is no device '{}' (add it to ExecutorOptions::devices)", name));
 }
 
 std::string Executor::Impl::task_name(TaskId task) const {

@@ -9,6 +9,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "redag/base/atomic.hpp"
@@ -44,7 +45,7 @@ class Executor::Impl {
   Impl(const Impl &) = delete;
   Impl &operator=(const Impl &) = delete;
 
-  DagId add(Dag dag, std::vector<DagBuilder::Function> functions, Sources sources);
+  DagId add(Dag dag, std::vector<TaskBody> bodies, Sources sources);
   void remove(DagId dag);
   void run_for(nanoseconds duration);
   void start();
@@ -53,6 +54,7 @@ class Executor::Impl {
   void request_stop() noexcept;
   void drain(std::vector<JobEvent> &events);
   [[nodiscard]] DagStats stats(DagId dag) const;
+  [[nodiscard]] DeviceHandle device(std::string_view name) const;
   [[nodiscard]] std::string task_name(TaskId task) const;
   [[nodiscard]] const Setup &setup() const { return setup_; }
   [[nodiscard]] const Engine &engine() const { return *engine_; }

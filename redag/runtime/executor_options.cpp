@@ -33,6 +33,23 @@ void check_duration(const char *option, nanoseconds value) {
                      format_duration(value.count())));
 }
 
+void check_devices(const std::vector<Device> &devices) {
+  if (devices.size() > kMaxDevices) {
+    refuse(fmt::format("ExecutorOptions::devices has {} entries; at most {} are allowed", devices.size(), kMaxDevices));
+  }
+  for (std::size_t d = 0; d < devices.size(); ++d) {
+    const std::string place = fmt::format("ExecutorOptions::devices[{}]", d);
+    if (const std::string why = name_mistake(devices[d].name); !why.empty()) {
+      refuse(fmt::format("{}: the name {} {}", place, in_quotes(devices[d].name), why));
+    }
+    for (std::size_t other = 0; other < d; ++other) {
+      if (devices[other].name != devices[d].name) continue;
+      refuse(fmt::format("{}: the name '{}' is used by another device (choose a unique one)", place, devices[d].name));
+    }
+    check_range("devices: slots", devices[d].slots, 1U, kMaxSlots);
+  }
+}
+
 }  // namespace
 
 [[noreturn]] void refuse(const std::string &what) { throw std::invalid_argument(what); }
@@ -49,6 +66,7 @@ void check(const ExecutorOptions &options) {
   }
   check_range("trace_capacity", options.trace_capacity, std::size_t{0}, kMaxTraceCapacity);
   check_range("record_bytes", options.record_bytes, kMinRecordBytes, kMaxRecordBytes);
+  check_devices(options.devices);
   check_duration("spin", options.spin);
   check_duration("stop_timeout", options.stop_timeout);
   if (!options.watchdog) return;

@@ -69,9 +69,12 @@ struct ExecutorOptions {
   std::uint32_t workers = 0;  // jobs that execute at the same time, at most 4096; 0: one a usable processor
   PreemptionMode preemption = PreemptionMode::Auto;
   PolicyKind policy = PolicyKind::RateMonotonic;
-  Ties ties = Ties::Share;         // jobs of equal priority: by earlier release, or by the order of tasks
-  std::uint32_t threads = 0;       // os: jobs that can be started and unfinished at once; 0: workers + 16; at most 8192
-  std::vector<int> cpus{};         // processors for the workers; empty: os takes `workers` of the usable ones
+  Ties ties = Ties::Share;    // jobs of equal priority: by earlier release, or by the order of tasks
+  std::uint32_t threads = 0;  // os: jobs that can be started and unfinished at once; 0: workers + 16; at most 8192
+  std::vector<int> cpus{};    // processors for the workers; empty: os takes `workers` of the usable ones
+  /// What the bodies of jobs wait for with DeviceHandle::run(): accelerators and the like. A device serves as many jobs
+  /// at a time as it has slots, with a thread for each.
+  std::vector<Device> devices{};
   nanoseconds spin{};              // none, cooperative: how long a worker spins before it sleeps
   bool lock_memory = false;        // if refused, warnings() says so
   std::size_t trace_capacity = 0;  // events kept between two drain(); 0: none, or with `record` 32,768

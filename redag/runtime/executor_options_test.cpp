@@ -36,7 +36,7 @@ std::string thrown_by(const std::function<void()> &call) {
   return "nothing was thrown";
 }
 
-const DagBuilder::Function kBody = [] {};
+const TaskBody kBody = [] {};
 
 /// Returns the text of the exception that add() throws for a DAG with a task `t` made by `make`.
 std::string refused(const std::function<void(DagBuilder &)> &make, const DagOptions &dag_options = {}) {

@@ -12,22 +12,9 @@ namespace redag::runtime {
 using sched::Dispatch;
 using sched::DispatchKind;
 
-namespace {
-
-// Chooses the job that the calling thread starts: the one on top of the job below, or the most urgent of all.
-const Dispatch *choose_own(const sched::Step &step, JobSlot below) {
-  const Dispatch *own = nullptr;
-  for (const Dispatch &dispatch : step.dispatches) {
-    if (dispatch.kind != DispatchKind::Start || (below.valid() && dispatch.over != below)) continue;
-    if (own == nullptr || dispatch.level < own->level) own = &dispatch;
-  }
-  return own;
-}
-
-}  // namespace
-
-JobPlacement::JobPlacement(WorkerPool &pool, bool os, const PriorityBand &band, Parker *lookout)
+JobPlacement::JobPlacement(WorkerPool &pool, WaitingJobs &waiting, bool os, const PriorityBand &band, Parker *lookout)
     : pool_(pool),
+      waiting_(waiting),
       os_(os),
       band_(band),
       priorities_(os ? pool.size() : 0, band.top_job),
@@ -48,7 +35,11 @@ void JobPlacement::place(const sched::Step &step, const Situation &situation, Ta
   const Dispatch *own = taker == nullptr ? nullptr : serve(*taker, step, situation, tasks);
   for (const Dispatch &dispatch : step.dispatches) {
     if (&dispatch == own) continue;
-    if (dispatch.kind != DispatchKind::Start) {
+    if (!needs_thread(dispatch)) {
+      if (dispatch.kind == DispatchKind::Serve) {
+        waiting_.serve(dispatch.job);
+        continue;
+      }
       const bool resumes = taker != nullptr && dispatch.kind == DispatchKind::Resume && dispatch.job == taker->below;
       if (resumes) taker->next.kind = Next::Kind::Resume;
       if (os_) change_level(dispatch, tasks);
@@ -100,11 +91,34 @@ const Dispatch *JobPlacement::serve(Taker &taker, const sched::Step &step, const
   return own;
 }
 
-void JobPlacement::end(WorkerThread &thread) {
+// Chooses the job that the calling thread runs: the one on top of the job below, or the most urgent of all.
+const Dispatch *JobPlacement::choose_own(const sched::Step &step, JobSlot below) const {
+  const Dispatch *own = nullptr;
+  for (const Dispatch &dispatch : step.dispatches) {
+    if (!needs_thread(dispatch) || (below.valid() && dispatch.over != below)) continue;
+    if (own == nullptr || dispatch.level < own->level) own = &dispatch;
+  }
+  return own;
+}
+
+void JobPlacement::leave(WorkerThread &thread) {
   thread.stack.pop_back();
   mailboxes_.end(thread);
   if (os_ && &thread != &pool_.caller()) priorities_.end(thread.index);
-  --unfinished_;
+}
+
+void JobPlacement::fill_woken(WorkerThread &thread, const Dispatch &dispatch, const TaskEntry &entry,
+                              Assignment &assignment) {
+  WaitingJob &job = *waiting_.find(dispatch.job);
+  waiting_.remove(dispatch.job);
+  job.job.worker = dispatch.worker;
+  assignment.job = job.job;
+  assignment.entry = job.entry;
+  assignment.woken = &job;
+  assignment.measured = job.measured;
+  assignment.expected_short = entry.expected_short();
+  thread.level = dispatch.level;
+  thread.is_spared = dispatch.inherits || entry.is_high;
 }
 
 // With `os`, the leader is above all jobs while it waits, as the release thread is.
@@ -125,6 +139,7 @@ void JobPlacement::move_job(WorkerThread &from, WorkerThread &to, bool may_lead,
 }
 
 void JobPlacement::change_level(const Dispatch &dispatch, const TaskTable &tasks) {
+  if (waiting_.find(dispatch.job) != nullptr) return;  // it is told its level when it goes on
   const auto runs_it = [&](const WorkerThread &t) { return !t.stack.empty() && t.stack.back().slot == dispatch.job; };
   if (runs_it(pool_.caller())) return;  // runs at its own priority
   const auto thread = std::find_if(pool_.threads().begin(), pool_.threads().end(),

@@ -14,6 +14,7 @@
 #include "redag/runtime/setup.hpp"
 #include "redag/runtime/task_table.hpp"
 #include "redag/runtime/thread_priorities.hpp"
+#include "redag/runtime/waiting_jobs.hpp"
 #include "redag/runtime/worker_pool.hpp"
 #include "redag/sched/scheduler.hpp"
 
@@ -47,7 +48,7 @@ struct Situation {
 class JobPlacement {
  public:
   /// os: the kernel schedules the threads by their priorities in `band`. For `lookout` see Mailboxes.
-  JobPlacement(WorkerPool &pool, bool os, const PriorityBand &band, Parker *lookout);
+  JobPlacement(WorkerPool &pool, WaitingJobs &waiting, bool os, const PriorityBand &band, Parker *lookout);
 
   /// All threads wait for jobs, on that many processors.
   void start(std::size_t processors);
@@ -73,12 +74,17 @@ class JobPlacement {
     return true;
   }
   /// The thread's topmost job has ended.
-  void end(WorkerThread &thread);
+  void end(WorkerThread &thread) {
+    leave(thread);
+    --unfinished_;
+  }
+  /// The thread's topmost job waits. It is among the waiting jobs until it has a thread again.
+  void leave(WorkerThread &thread);
 
   /// For the lookout: returns true if it should look again.
   bool look(WakeUps &wake_ups) { return mailboxes_.look(wake_ups); }
 
-  /// Jobs placed and not ended.
+  /// Jobs placed and not ended, also those that wait.
   [[nodiscard]] std::uint32_t unfinished() const { return unfinished_; }
   /// Priority changes that the system refused.
   [[nodiscard]] std::uint64_t refused_priorities() const { return refused_priorities_; }
@@ -92,15 +98,27 @@ class JobPlacement {
   }
 
  private:
+  /// Returns true if the job needs a thread: it starts, or it has waited and goes on.
+  [[nodiscard]] bool needs_thread(const sched::Dispatch &dispatch) const {
+    if (dispatch.kind == sched::DispatchKind::Start) return true;
+    return dispatch.kind == sched::DispatchKind::Resume && waiting_.find(dispatch.job) != nullptr;
+  }
+  const sched::Dispatch *choose_own(const sched::Step &step, JobSlot below) const;
   const sched::Dispatch *serve(Taker &taker, const sched::Step &step, const Situation &situation, TaskTable &tasks);
   void add_idle(WorkerThread &thread, bool may_lead);
   // `assignment`, which these fill, is the thread's mail or its next action.
   void move_job(WorkerThread &from, WorkerThread &to, bool may_lead, Assignment &assignment);
   void assign(WorkerThread &thread, const sched::Dispatch &dispatch, TaskEntry &entry, Assignment &assignment) {
-    fill(thread, dispatch, entry, assignment);
-    ++unfinished_;
+    if (dispatch.kind == sched::DispatchKind::Start) {
+      fill(thread, dispatch, entry, assignment);
+      ++unfinished_;
+    } else {
+      fill_woken(thread, dispatch, entry, assignment);
+    }
     thread.stack.push_back(assignment.job);
   }
+  void fill_woken(WorkerThread &thread, const sched::Dispatch &dispatch, const TaskEntry &entry,
+                  Assignment &assignment);
   static void fill(WorkerThread &thread, const sched::Dispatch &dispatch, TaskEntry &entry, Assignment &assignment) {
     REDAG_CHECK(entry.busy < entry.concurrency, "more jobs of one task at a time than it allows");
     ++entry.busy;
@@ -111,6 +129,7 @@ class JobPlacement {
                       .slot = dispatch.job,
                       .worker = dispatch.worker};
     assignment.entry = &entry;
+    assignment.woken = nullptr;
     assignment.measured = entry.always_measured;
     assignment.expected_short = entry.expected_short();
     thread.level = dispatch.level;
@@ -131,6 +150,7 @@ class JobPlacement {
   }
 
   WorkerPool &pool_;
+  WaitingJobs &waiting_;
   bool os_;
   PriorityBand band_;
   ThreadPriorities priorities_;  // os

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The job that a thread runs now, for preemption_point() and job_cpu_time(). Internal to the engine. Written by that
-// thread. Jobs that follow each other on the thread use one object.
+// thread. Jobs that follow each other on the thread use one object. A job that waits has another one afterwards.
 #pragma once
 
 #include <cstdint>
@@ -16,9 +16,12 @@ namespace redag::runtime {
 
 class Engine;
 struct RunningJob;
+struct WaitingJob;
 struct WorkerThread;
 
 namespace detail {
+
+struct Wait;
 
 // Initial exec: see redag/base/thread_id.hpp.
 extern constinit thread_local RunningJob *current_job __attribute__((tls_model("initial-exec")));
@@ -43,20 +46,28 @@ struct RunningJob {
   Time origin = 0;             // see Job
   Duration limit = kNever;     // processor time of its next limit to check; kNever: none
   Time begun = 0;              // on the engine's clock
-  CpuMeter::Start start;       // excludes jobs that ran on top
+  Time here_since = 0;         // on the engine's clock: when it began, or went on after its last wait
+  CpuMeter::Start start;       // of its stretch since then; excludes jobs that ran on top
+  Duration before = 0;         // processor time until then
+  Duration earlier = 0;        // how long it was in progress on threads until then
   bool measured = false;       // its processor time is asked for, however short it was
   bool used_wcet_low = false;  // reported to the scheduler; written under the engine's lock
   bool used_budget = false;
-  bool reported = false;  // was reported overdue; written under the engine's lock
+  bool reported = false;          // was reported overdue; written under the engine's lock
+  bool cancelled = false;         // it ended because its wait was cancelled
+  WaitingJob *waiting = nullptr;  // what is kept of it between its waits; null: it has not waited
+  detail::Wait *wait = nullptr;   // set by the body: what it waits for now; null: it has ended
   // Set by close():
   Time ended = kNever;    // on the engine's clock; kNever: close() has not been called
   Duration charged = 0;   // processor time of the whole job
-  bool on_trust = false;  // `charged` is the time that the job took on the clock
+  bool on_trust = false;  // `charged` counts the time that the last stretch took on the clock
 
   void reach_preemption_point();
   void reach_limit(Duration used);
   /// Processor time until now, never too little. If its start is not exact, at most what the job took on the clock.
-  [[nodiscard]] Duration cpu_time() const noexcept;
+  [[nodiscard]] Duration cpu_time() const noexcept { return before + stretch_cpu_time(); }
+  /// The same since the job's last wait.
+  [[nodiscard]] Duration stretch_cpu_time() const noexcept;
   /// Ends the job: sets `ended` and `charged`. A body that is about to return and needs them may call it. Otherwise the
   /// engine does. Later calls have no effect. A job that is over within CpuMeter::kShort is charged this time on trust:
   /// asking for its processor time would be a system call.

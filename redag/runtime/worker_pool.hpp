@@ -24,8 +24,9 @@ namespace redag::runtime {
 /// A job on its way to a thread.
 struct Assignment {
   Job job;
-  TaskEntry *entry = nullptr;  // keeps its address; its body is not touched while `busy`
-  bool measured = false;       // its processor time is asked for, however short it was
+  TaskEntry *entry = nullptr;   // keeps its address; its body is not touched while `busy`
+  WaitingJob *woken = nullptr;  // the job has waited and goes on; null: it begins
+  bool measured = false;        // its processor time is asked for, however short it was
   bool expected_short = false;
 };
 

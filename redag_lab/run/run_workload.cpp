@@ -13,6 +13,7 @@
 #include "redag/base/mutex.hpp"
 #include "redag/model/clusters.hpp"
 #include "redag/model/validate.hpp"
+#include "redag/model/waits.hpp"
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/live_sample.hpp"
 #include "redag/runtime/release_timer.hpp"
@@ -74,10 +75,10 @@ class Run {
     if (kind == nullptr && !options_.scheduler) {
       return make_error(fmt::format("there is no executor '{}'", options_.executor));
     }
-    Diagnostics mistakes = validate(workload_);
+    const bool preemptive = kind == nullptr || kind->ours;
+    Diagnostics mistakes = validate(workload_, {.waits = preemptive});
     std::erase_if(mistakes, [](const Diagnostic &mistake) { return mistake.severity != Severity::Error; });
     if (!mistakes.empty()) return tl::unexpected<Diagnostics>(std::move(mistakes));
-    const bool preemptive = kind == nullptr || kind->ours;
     const auto wanted = options_.preemption.value_or(workload_.platform.preemption);
     parts_ = parts_of(workload_);
     places_ = places_in(parts_);
@@ -150,6 +151,8 @@ class Run {
     engine.measure = options_.live;
     engine.spins = spins;
     if (options_.lock_memory) engine.touched_stack = runtime::kTouchedStack;
+    engine.devices = part.workload.platform.devices;
+    engine.waits_priority = setup->timer_priority();
     if (kind != nullptr) engine.config = executors::effective_config(*kind, engine.config);
     auto scheduler = options_.scheduler ? options_.scheduler(part.workload, engine.config)
                                         : executors::make_scheduler(options_.executor, part.workload, engine.config);
@@ -162,6 +165,9 @@ class Run {
     instance.timer = std::make_unique<runtime::ReleaseTimer>(
         [this, &instance](auto releases) { release(instance, releases); }, options_.seed);
     instance.engine->share_releases(instance.timer->thread());
+    if (has_waits(part.workload)) {
+      if (Result<void> ready = instance.engine->let_wait(); !ready) return ready;
+    }
     std::size_t next = 0;
     for (const Dag &dag : part.workload.dags) {
       instance.timer->add(dag, std::span(part.tasks).subspan(next, dag.tasks.size()), 0);

@@ -215,9 +215,20 @@ class Waits(Case):
         fifo = self.write("fifo.yaml", one.read_text().replace("queue: priority", "queue: fifo"))
         self.expect(redag("analyze", fifo, "--check"), 1)
 
+    def test_run_on_threads_and_checked(self):
+        for mode in "none", "cooperative":
+            with self.subTest(mode=mode):
+                out = self.folder / mode
+                self.expect(redag("run", self.FILE, "--preemption", mode, "--duration", "1s", "--out", out, "--check"), 0)
+                events = redag("events", out).stdout
+                for kind in ("waits", "served", "woken"):
+                    self.assertIn(kind, events)
+                self.expect(redag("check-trace", out), 0)
+                self.assertIn("waited without a worker", self.expect(redag("why", out, "lidar.segment#0"), 0).stdout)
+
     def test_others_refuse_them(self):
         where = f"{self.FILE}:{1 + self.FILE.read_text().splitlines().index(self.segments())}:"
-        for arguments in (["run"], ["simulate", "--executor", "mte"], ["compare"], ["tune"], ["assign"], ["sensitivity"]):
+        for arguments in (["run", "--executor", "mte"], ["simulate", "--executor", "mte"], ["compare"], ["tune"], ["assign"], ["sensitivity"]):
             with self.subTest(arguments=arguments):
                 self.expect(redag(arguments[0], self.FILE, *arguments[1:]), 2, where, "segments, which cannot be handled here")
 

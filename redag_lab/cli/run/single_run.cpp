@@ -40,8 +40,7 @@ int run_once(const RunArguments &arguments, const std::string &executor, trace::
     console.error(fmt::format("the simulator has no threads to make real-time: use '{}'", variant->executor));
     return kExitBad;
   }
-  const std::optional<Workload> workload =
-      load_configured(arguments, console, {.waits = simulated && variant->is_redag()});
+  const std::optional<Workload> workload = load_configured(arguments, console, {.waits = variant->is_redag()});
   if (!workload) return kExitBad;
   if (!takes_arguments({*variant}, arguments, console)) return kExitBad;
   if (const Result<Workload> configured = lab::configure(*workload, *variant); !configured) {

@@ -1,0 +1,41 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// An event that jobs await and that any thread sets: the answer of a service, the interrupt of a sensor, the callback
+// of a driver. A body awaits it with co_await (coroutine.hpp). Any thread; the lock inherits priority.
+#pragma once
+
+#include <memory>
+
+#include "redag/runtime/coroutine.hpp"
+
+namespace redag {
+
+class AsyncEvent {
+ public:
+  /// Allocates. No job may wait for an event that is destroyed.
+  AsyncEvent();
+  ~AsyncEvent();
+  AsyncEvent(const AsyncEvent &) = delete;
+  AsyncEvent &operator=(const AsyncEvent &) = delete;
+
+  /// Ends the wait of all jobs that wait for the event. If there is none, the next job that awaits it goes on at once;
+  /// several calls then count as one. Takes the locks of the event and of the engine; allocates nothing. From any
+  /// thread and any body, but not from a signal handler.
+  void set();
+  /// Returns true, and takes it back, if set() was called and no job has awaited the event since then.
+  [[nodiscard]] bool take();
+
+  struct Awaiter : runtime::detail::Awaiter {
+    AsyncEvent *event = nullptr;
+
+    [[nodiscard]] bool await_ready() const { return event->take(); }
+  };
+  /// For co_await.
+  [[nodiscard]] Awaiter in_coroutine() noexcept;
+
+ private:
+  std::unique_ptr<runtime::detail::EventState> state_;
+};
+
+}  // namespace redag

@@ -1,0 +1,61 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// A device of an executor, as bodies use it: co_await device.run(f). The device's slots are given in the order of jobs,
+// or in that of their requests (ExecutorOptions::devices). A value; any thread.
+#pragma once
+
+#include <memory>
+#include <utility>
+
+#include "redag/runtime/coroutine.hpp"
+
+namespace redag::runtime {
+
+class DeviceHandle {
+ public:
+  template <class Function>
+  class Run;
+
+  /// co_await device.run(f): the job leaves its worker and queues for the device. When it has a slot, a thread of the
+  /// device calls `f`, which submits work to the accelerator and returns when it is done. Then the slot is free, and
+  /// the job goes on. The co_await throws what `f` throws, and std::logic_error in a job of another executor. `f` is no
+  /// part of the job: it has no budget and no preemption points, and may block.
+  template <class Function>
+  [[nodiscard]] Run<Function> run(Function function) const {
+    return Run<Function>(*this, std::move(function));
+  }
+
+  /// For the executor: device number `device` of the engine.
+  DeviceHandle(const Engine &engine, DeviceId device) noexcept : device_(device), engine_(&engine) {}
+
+ private:
+  /// Throws std::logic_error if the calling job is not of the device's executor.
+  void check() const;
+
+  DeviceId device_;
+  const Engine *engine_;
+};
+
+template <class Function>
+class DeviceHandle::Run : public detail::Awaiter {
+ public:
+  Run(const DeviceHandle &device, Function function) : device_(device), function_(std::move(function)) {
+    wait.kind = detail::Wait::Kind::Device;
+    wait.device = device.device_;
+  }
+  void await_suspend(std::coroutine_handle<> coroutine) {
+    device_.check();
+    wait.function = [](void *function) { (*static_cast<Function *>(function))(); };
+    wait.argument = std::addressof(function_);
+    wait.suspend(coroutine);
+  }
+  /// For co_await.
+  [[nodiscard]] Run &in_coroutine() noexcept { return *this; }
+
+ private:
+  DeviceHandle device_;
+  Function function_;
+};
+
+}  // namespace redag::runtime

@@ -1,0 +1,70 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+#include "redag/runtime/device_threads.hpp"
+
+#include <utility>
+
+#include "redag/base/check.hpp"
+
+namespace redag::runtime {
+
+DeviceThreads::DeviceThreads(const std::vector<Device> &devices) : devices_(devices), idle_(devices.size()) {
+  for (std::size_t d = 0; d < devices.size(); ++d) {
+    for (std::uint32_t slot = 0; slot < devices[d].slots; ++slot) {
+      threads_.push_back(std::make_unique<DeviceThread>());
+      threads_.back()->device = DeviceId(d);
+    }
+    idle_[d].reserve(devices[d].slots);
+  }
+}
+
+Result<void> DeviceThreads::start(const std::string &name, int priority, const Served &served) {
+  for (const auto &thread : threads_) {
+    const std::string its_name = name + "-" + devices_[thread->device.value].name;
+    Result<ThreadHandle> started =
+        start_thread({its_name, priority, {}}, [this, served, &self = *thread] { main(self, served); });
+    if (!started) return tl::unexpected(started.error());
+    thread->handle = *std::move(started);
+    add_idle(*thread);
+  }
+  return {};
+}
+
+void DeviceThreads::end() {
+  ending_.store(true, std::memory_order_release);
+  for (const auto &thread : threads_) {
+    thread->parker.unpark();
+    if (thread->handle.joinable()) thread->handle.join();
+  }
+  for (auto &idle : idle_) idle.clear();
+  ending_.store(false, std::memory_order_release);
+}
+
+void DeviceThreads::serve(detail::Wait &wait) {
+  auto &idle = idle_[wait.device.value];
+  REDAG_CHECK(!idle.empty(), "a device serves more jobs than it has slots");
+  DeviceThread &thread = *idle.back();
+  idle.pop_back();
+  thread.wait = &wait;
+  thread.parker.unpark();
+}
+
+void DeviceThreads::main(DeviceThread &self, const Served &served) noexcept {
+  for (;;) {
+    self.parker.park();
+    detail::Wait *const wait = std::exchange(self.wait, nullptr);
+    if (wait == nullptr) {
+      if (ending_.load(std::memory_order_acquire)) return;
+      continue;
+    }
+    try {
+      wait->function(wait->argument);
+    } catch (...) {
+      wait->exception = std::current_exception();
+    }
+    served(self, wait->job);
+  }
+}
+
+}  // namespace redag::runtime

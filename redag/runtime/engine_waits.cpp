@@ -1,0 +1,129 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// Jobs that wait without a thread: how they leave their threads, and who wakes them.
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "redag/base/check.hpp"
+#include "redag/runtime/clock.hpp"
+#include "redag/runtime/engine.hpp"
+#include "redag/runtime/engine_locked.hpp"
+
+namespace redag::runtime {
+
+Result<void> Engine::let_wait() {
+  if (lets_wait_) return {};
+  if (!sleepers_) sleepers_ = std::make_unique<ReleaseThread>([this] { return wake_sleepers(); });
+  if (!wakes_) wakes_ = std::make_shared<InProgress>();
+  Result<void> started = sleepers_->start({options_.name + "-waits", options_.waits_priority, {}});
+  if (!started) return started;
+  started = devices_.start(options_.name, options_.waits_priority,
+                           [this](DeviceThread &thread, JobSlot job) { end_service(thread, job); });
+  if (!started) {
+    devices_.end();
+    return started;
+  }
+  lets_wait_ = true;
+  return {};
+}
+
+// No job is left.
+void Engine::end_waits() {
+  sleepers_->stop();
+  sleepers_->join();
+  devices_.end();
+  wakes_->wait();
+}
+
+// The body has returned at a co_await. Returns when the thread's next job begins, or nothing if the job ends instead,
+// cut off at its budget. Once the lock is released, another thread may run the job, and end it.
+std::optional<Time> Engine::suspend(Taker &taker, RunningJob &running) {
+  REDAG_CHECK(lets_wait_, "a job waits in an engine without let_wait()");
+  WorkerThread &self = taker.thread;
+  WaitingJob &job = *running.waiting;
+  TaskEntry &entry = *taker.next.assignment.entry;
+  const Time at = running.ended;
+  if (entry.cuts_off && entry.budget > 0 && running.charged > entry.budget) {
+    delete std::exchange(running.waiting, nullptr);  // the destructors of the body's locals run here
+    return std::nullopt;
+  }
+  bool delayed = false;
+  {
+    Locked locked(*this, &delayed);
+    withdraw_if_halting(locked);
+    self.used += running.charged - running.before;
+    if (running.charged > running.limit) report_limits(running, running.charged, at);
+    job.wait = running.wait;
+    job.job = taker.next.assignment.job;
+    job.entry = &entry;
+    job.begun = running.begun;
+    job.charged = running.charged;
+    job.earlier = running.earlier + at - running.here_since;
+    job.measured = running.measured;
+    job.used_wcet_low = running.used_wcet_low;
+    job.used_budget = running.used_budget;
+    job.reported = running.reported;
+    waiting_.add(job);
+    placement_.leave(self);
+    scheduler_->wait(running.slot, job.wait->device, at);
+    const Time alarm = waiting_.next_alarm();
+    if (!waiting_.begin(*job.wait)) {
+      waiting_.end(running.slot);
+      scheduler_->wake(running.slot, at);
+    } else if (waiting_.next_alarm() < alarm) {
+      sleepers_->changed();
+    }
+    taker.next.kind = Next::Kind::Nothing;
+    decide(locked, at, &taker);
+  }
+  return delayed || !running.on_trust ? now() : at;
+}
+
+void Engine::wake(Locked &locked, JobSlot job, Time at) {
+  withdraw_if_halting(locked);
+  waiting_.end(job);
+  scheduler_->wake(job, at);
+}
+
+// Once the lock is released, the job may end, and join() return.
+void Engine::wake(JobSlot job) {
+  const Time at = now();
+  std::shared_ptr<InProgress> wakes;
+  {
+    Locked locked(*this, Locked::WakesAtOnce());
+    wakes = wakes_;
+    wakes->begin();
+    wake(locked, job, at);
+    decide(locked, at);
+  }
+  static_cast<void>(wakes->end());
+}
+
+Time Engine::wake_sleepers() {
+  const Time due = monotonic_now();
+  const Time at = now();
+  Locked locked(*this);
+  withdraw_if_halting(locked);
+  bool woken = false;
+  for (; waiting_.next_alarm() <= due; woken = true) wake(locked, waiting_.take_sleeper(), at);
+  if (woken) decide(locked, at);
+  return waiting_.next_alarm();
+}
+
+void Engine::end_service(DeviceThread &thread, JobSlot job) {
+  const Time at = now();
+  Locked locked(*this);
+  waiting_.end_service(thread);
+  wake(locked, job, at);
+  decide(locked, at);
+}
+
+// After the stop a device serves nobody: each job that it would serve next is woken instead.
+void Engine::wake_cancelled(Locked &locked, Time at) {
+  while (waiting_.has_cancelled()) wake(locked, waiting_.take_cancelled(), at);
+  decide(locked, at);
+}
+
+}  // namespace redag::runtime

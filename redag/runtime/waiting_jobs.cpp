@@ -1,0 +1,72 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+#include "redag/runtime/waiting_jobs.hpp"
+
+#include <algorithm>
+
+#include "redag/base/check.hpp"
+#include "redag/runtime/clock.hpp"
+#include "redag/runtime/event_state.hpp"
+#include "redag/runtime/frame_pool.hpp"
+
+namespace redag::runtime {
+
+void *WaitingJob::operator new(std::size_t size) { return take_storage(size); }
+void WaitingJob::operator delete(void *storage, std::size_t size) noexcept { give_back_storage(storage, size); }
+
+void WaitingJobs::reserve(std::size_t jobs) {
+  sleepers_.reserve(jobs);
+  cancelled_.reserve(jobs);
+}
+
+bool WaitingJobs::begin(detail::Wait &wait) {
+  if (wait.kind == detail::Wait::Kind::Device) return true;
+  if (stopped_) {
+    wait.cancelled = true;
+    return false;
+  }
+  if (wait.kind == detail::Wait::Kind::Event) return wait.event->add(wait);
+  if (wait.until <= monotonic_now()) return false;
+  sleepers_.push_back({wait.until, wait.job});
+  std::push_heap(sleepers_.begin(), sleepers_.end());
+  return true;
+}
+
+JobSlot WaitingJobs::take_sleeper() {
+  const JobSlot first = sleepers_.front().job;
+  std::pop_heap(sleepers_.begin(), sleepers_.end());
+  sleepers_.pop_back();
+  return first;
+}
+
+void WaitingJobs::serve(JobSlot slot) {
+  detail::Wait &wait = *by_slot_[slot.value]->wait;
+  if (!stopped_) return devices_.serve(wait);
+  wait.cancelled = true;
+  cancelled_.push_back(slot);
+}
+
+void WaitingJobs::cancel_all() {
+  stopped_ = true;
+  sleepers_.clear();
+  for_each([this](WaitingJob &job) {
+    if (cancel(*job.wait)) cancelled_.push_back(job.job.slot);
+  });
+}
+
+// A job whose event has just been set is woken by the thread that set it.
+bool WaitingJobs::cancel(detail::Wait &wait) {
+  if (wait.is_over) return false;
+  switch (wait.kind) {
+    case detail::Wait::Kind::Device: return false;
+    case detail::Wait::Kind::Event:
+      if (!wait.event->remove(wait)) return false;
+      break;
+    case detail::Wait::Kind::Sleep: break;
+  }
+  wait.cancelled = true;
+  return true;
+}
+
+}  // namespace redag::runtime

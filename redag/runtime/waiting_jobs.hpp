@@ -1,0 +1,121 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// The jobs that wait without a thread (docs/model.md, "Waits"), and those that are woken and have no thread yet. Knows
+// what each waits for, begins its wait and can end it early. When a wait ends, it is the engine that tells the
+// scheduler. Allocates in reserve(), and where a job waits in a larger slot than any before. Not thread-safe: the
+// engine's lock guards it.
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "redag/runtime/coroutine.hpp"
+#include "redag/runtime/device_threads.hpp"
+#include "redag/runtime/job_body.hpp"
+#include "redag/runtime/running_job.hpp"
+
+namespace redag::runtime {
+
+struct TaskEntry;
+
+/// A job whose body has waited, from its first wait to its end. While the body runs, its thread alone uses it.
+struct WaitingJob {
+  explicit WaitingJob(Coroutine body) : coroutine(std::move(body)) {}
+
+  Coroutine coroutine;           // the body; awaits others
+  detail::Wait *wait = nullptr;  // what it waits for; its coroutine goes on first
+  // Of the job until its last wait:
+  Job job;
+  TaskEntry *entry = nullptr;
+  Time begun = 0;        // of the body
+  Duration charged = 0;  // processor time
+  Duration earlier = 0;  // that it was in progress on a thread
+  bool measured = false;
+  bool used_wcet_low = false;
+  bool used_budget = false;
+  bool reported = false;
+
+  // From the pool of frames.
+  [[nodiscard]] static void *operator new(std::size_t size);
+  static void operator delete(void *storage, std::size_t size) noexcept;
+};
+
+class WaitingJobs {
+ public:
+  explicit WaitingJobs(DeviceThreads &devices) : devices_(devices) {}
+
+  /// Up to `jobs` wait at a time. May be called again with a larger number.
+  void reserve(std::size_t jobs);
+
+  /// The job has left its thread, and waits or is woken.
+  void add(WaitingJob &job) {
+    const std::size_t slot = job.job.slot.value;
+    if (slot >= by_slot_.size()) by_slot_.resize(std::bit_ceil(slot + 1), nullptr);
+    by_slot_[slot] = &job;
+    ++count_;
+  }
+  /// The job has a thread from now on.
+  void remove(JobSlot slot) {
+    by_slot_[slot.value] = nullptr;
+    --count_;
+  }
+  /// Returns null if that job is none of these.
+  [[nodiscard]] WaitingJob *find(JobSlot slot) const {
+    return slot.value < by_slot_.size() ? by_slot_[slot.value] : nullptr;
+  }
+  [[nodiscard]] bool empty() const { return count_ == 0; }
+  template <class Function>
+  void for_each(Function function) const {
+    if (empty()) return;
+    for (WaitingJob *job : by_slot_) {
+      if (job != nullptr) function(*job);
+    }
+  }
+
+  /// Begins the wait of a job, except at a device, where it queues first. Returns false if the wait is over already.
+  [[nodiscard]] bool begin(detail::Wait &wait);
+  /// The wait of a job is over: it is woken.
+  void end(JobSlot slot) { by_slot_[slot.value]->wait->is_over = true; }
+  /// A device has a slot for the job: a thread of the device begins to serve it. After cancel_all() the job's wait is
+  /// cancelled instead.
+  void serve(JobSlot slot);
+  /// A thread of a device has served a job.
+  void end_service(DeviceThread &thread) { devices_.add_idle(thread); }
+
+  /// When the first sleeper is to be woken (CLOCK_MONOTONIC); kNever: there is none.
+  [[nodiscard]] Time next_alarm() const { return sleepers_.empty() ? kNever : sleepers_.front().until; }
+  /// Takes the first sleeper, whose wait is over.
+  JobSlot take_sleeper();
+
+  /// Cancels all waits but those at devices, and from now on all that would begin. Jobs that a device serves are served
+  /// to the end.
+  void cancel_all();
+  [[nodiscard]] bool has_cancelled() const { return !cancelled_.empty(); }
+  /// Takes a job whose wait was cancelled and that is to be woken.
+  JobSlot take_cancelled() {
+    const JobSlot slot = cancelled_.back();
+    cancelled_.pop_back();
+    return slot;
+  }
+
+ private:
+  struct Sleeper {
+    Time until = 0;
+    JobSlot job;
+    // For the standard's heaps, whose top is the largest.
+    friend bool operator<(const Sleeper &a, const Sleeper &b) { return a.until > b.until; }
+  };
+  [[nodiscard]] static bool cancel(detail::Wait &wait);
+
+  DeviceThreads &devices_;
+  std::vector<WaitingJob *> by_slot_;  // null: none of these jobs has the slot
+  std::size_t count_ = 0;
+  std::vector<Sleeper> sleepers_;   // a heap
+  std::vector<JobSlot> cancelled_;  // to be woken
+  bool stopped_ = false;
+};
+
+}  // namespace redag::runtime
