@@ -69,6 +69,7 @@ class RecordingScheduler final : public sched::Scheduler {
   [[nodiscard]] std::size_t dag_slots() const override { return scheduler_->dag_slots(); }
   [[nodiscard]] sched::Accounting accounting(TaskId task) const override { return scheduler_->accounting(task); }
   [[nodiscard]] std::uint32_t ready(TaskId task) const override { return scheduler_->ready(task); }
+  [[nodiscard]] std::uint32_t level(TaskId task) const override { return scheduler_->level(task); }
   [[nodiscard]] std::uint64_t thread_waits() const override { return scheduler_->thread_waits(); }
 
  private:

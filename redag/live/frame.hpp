@@ -32,6 +32,7 @@ struct TaskFrame {
   Duration bound = 0;     // 0: not known
   page::Figures figures{};
   page::Spread spread{};
+  int priority = 0;  // SCHED_FIFO; 0: none of its own
 };
 
 /// A worker thread.

@@ -118,7 +118,8 @@ void FrameBuilder::build_tasks(const Sample &sample, bool turns, Frame &frame) {
                   .period = task.period,
                   .deadline = task.deadline,
                   .bound = task.bound,
-                  .figures = figures_of(task, current, recent, history.base)};
+                  .figures = figures_of(task, current, recent, history.base),
+                  .priority = task.priority};
     set_spread(row.spread, current.response, recent);
     add(dag.figures, row.figures);
     if (task.end_to_end) {

@@ -31,6 +31,7 @@ struct TaskSample {
   Duration period = 0;
   Duration deadline = 0;  // 0: none
   Duration bound = 0;     // 0: not known
+  int priority = 0;       // SCHED_FIFO; 0: none of its own
   std::uint64_t released = 0;
   std::uint64_t finished = 0;
   std::uint64_t skipped = 0;

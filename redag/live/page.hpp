@@ -100,7 +100,9 @@ struct TaskRow {
   std::int64_t deadline;  // relative; 0: none
   std::int64_t bound;     // proven bound on the response time; 0: not known
   Figures figures;
-  Spread spread;  // appended; see kLeastTaskRow
+  // Appended; see kLeastTaskRow.
+  Spread spread;
+  std::int64_t priority;  // SCHED_FIFO priority of its jobs that have inherited nothing; 0: none of its own
 };
 
 /// A worker thread. Those with the most recent work, ordered by number, if there are more than kThreads.
@@ -156,8 +158,8 @@ static_assert(offsetof(Header, sequence) == 80);
 static_assert(sizeof(Figures) == 160 && offsetof(Figures, response_p50) == 64 && offsetof(Figures, active) == 144);
 static_assert(sizeof(Spread) == 384 && sizeof(ThreadRow) == 24);
 static_assert(sizeof(DagRow) == 672 && offsetof(DagRow, figures) == 104 && offsetof(DagRow, deadline) == kLeastDagRow);
-static_assert(sizeof(TaskRow) == 672 && offsetof(TaskRow, period) == 104 && offsetof(TaskRow, figures) == 128);
-static_assert(offsetof(TaskRow, spread) == kLeastTaskRow);
+static_assert(sizeof(TaskRow) == 680 && offsetof(TaskRow, period) == 104 && offsetof(TaskRow, figures) == 128);
+static_assert(offsetof(TaskRow, spread) == kLeastTaskRow && offsetof(TaskRow, priority) == 672);
 static_assert(sizeof(FrameHeader) == 2072 && offsetof(FrameHeader, name) == 80);
 static_assert(offsetof(FrameHeader, alert) == kLeastFrameHeader && offsetof(FrameHeader, thread) == 536);
 

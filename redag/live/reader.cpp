@@ -222,14 +222,15 @@ Result<Frame> decode(const std::string &path, const Header &header, const FrameH
     TaskRow row{};
     std::memcpy(&row, at, std::min<std::size_t>(sizeof(row), header.task_row_size));
     plausible = plausible && row.dag < head.dags && is_duration(row.period) && is_duration(row.deadline) &&
-                is_duration(row.bound) && is_plausible(row.figures);
+                is_duration(row.bound) && is_plausible(row.figures) && row.priority >= 0 && row.priority <= 99;
     frame.tasks.push_back(TaskFrame{.name = get_name(row.name),
                                     .dag = row.dag,
                                     .period = row.period,
                                     .deadline = row.deadline,
                                     .bound = row.bound,
                                     .figures = row.figures,
-                                    .spread = row.spread});
+                                    .spread = row.spread,
+                                    .priority = static_cast<int>(row.priority)});
   }
   if (!plausible) return damaged(path, "its figures are out of range");
   return frame;

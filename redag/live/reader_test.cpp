@@ -101,6 +101,7 @@ Frame make_frame(std::size_t dags = 2, std::size_t tasks_each = 3, std::uint64_t
       task.figures.recent_max = static_cast<std::int64_t>(count);
       task.figures.waiting = static_cast<std::uint32_t>(t);
       task.spread.all[0] = static_cast<std::uint32_t>(count);
+      task.priority = 80 - static_cast<int>(t);
       task.spread.recent[page::kClasses - 1] = 3;
       frame.tasks.push_back(std::move(task));
     }
@@ -141,6 +142,7 @@ TEST_F(LivePage, IsReadAsItWasWritten) {
     EXPECT_EQ(read.tasks[i].dag, written.tasks[i].dag);
     EXPECT_EQ(read.tasks[i].deadline, written.tasks[i].deadline);
     EXPECT_EQ(read.tasks[i].bound, written.tasks[i].bound);
+    EXPECT_EQ(read.tasks[i].priority, written.tasks[i].priority);
     EXPECT_EQ(std::memcmp(&read.tasks[i].figures, &written.tasks[i].figures, sizeof(page::Figures)), 0);
     EXPECT_EQ(std::memcmp(&read.tasks[i].spread, &written.tasks[i].spread, sizeof(page::Spread)), 0);
   }
@@ -185,6 +187,7 @@ TEST_F(LivePage, RowsOfEarlierProgramsAreRead) {
   EXPECT_EQ(page->frame.tasks[5].name, "task2");
   EXPECT_EQ(page->frame.tasks[5].figures.released, 7U);
   EXPECT_EQ(page->frame.tasks[5].spread.all[0], 0U);
+  EXPECT_EQ(page->frame.tasks[5].priority, 0);
   EXPECT_EQ(page->frame.dags[1].deadline, 0);
   EXPECT_THAT(page->frame.threads, IsEmpty());
 }

@@ -6,7 +6,6 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/mman.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -15,6 +14,7 @@
 #include <cstring>
 #include <system_error>
 
+#include "redag/live/owned_file.hpp"
 #include "redag/live/process.hpp"
 #include "redag/live/reader.hpp"
 
@@ -50,14 +50,6 @@ tl::unexpected<Diagnostics> refused(const std::string &what) {
                     "'redag top' cannot show this executor; everything else works");
 }
 
-/// Creates a new file that only its owner can open; negative, with errno, on an error.
-int create_file(const std::string &path) {
-  constexpr mode_t kOwnerOnly = S_IRUSR | S_IWUSR;
-  const int descriptor = ::open(path.c_str(), O_CREAT | O_EXCL | O_RDWR | O_CLOEXEC | O_NOFOLLOW, kOwnerOnly);
-  if (descriptor >= 0) (void)::fchmod(descriptor, kOwnerOnly);  // restores what the umask took away
-  return descriptor;
-}
-
 }  // namespace
 
 Result<std::unique_ptr<PageWriter>> PageWriter::create(const std::string &folder, std::size_t slot_size) {
@@ -68,7 +60,7 @@ Result<std::unique_ptr<PageWriter>> PageWriter::create(const std::string &folder
   int descriptor = -1;
   for (unsigned number = 0; descriptor < 0; ++number) {
     path = page_path(folder, self.pid, number);
-    descriptor = create_file(path);
+    descriptor = create_owned_file(path);
     if (descriptor < 0 && (errno != EEXIST || number == kMostPages)) return refused(path);
   }
   const std::size_t size = kFirstSlot + 2 * slot_size;
@@ -191,6 +183,7 @@ void PageWriter::publish(const Frame &frame) {
     row.period = task.period;
     row.deadline = task.deadline;
     row.bound = task.bound;
+    row.priority = task.priority;
     row.figures = task.figures;
     row.spread = task.spread;
     put(row);

@@ -49,6 +49,10 @@ Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions option
     guard_.emplace(*options_.throttling, pool_, placement_);
     guard_thread_ = std::make_unique<HelperThread>();
   }
+  if (os() && !options_.order_folder.empty()) {
+    REDAG_CHECK(options_.band.shared, "the band of a shared order is shared");
+    order_thread_ = std::make_unique<HelperThread>();
+  }
 }
 
 Engine::~Engine() {
@@ -90,6 +94,7 @@ Result<void> Engine::start_threads(const std::vector<int> &cpus) {
   if (started && guard_thread_) {
     started = start_helper(*guard_thread_, "guard", options_.band.timer, [this] { guard_throttling(); });
   }
+  if (started && order_thread_) started = start_order();
   if (started && lookout_) {
     started = start_helper(*lookout_, "lookout", 0, [this] { look_out(); });
   }
@@ -105,11 +110,12 @@ Result<void> Engine::start_helper(HelperThread &helper, const char *name, int pr
 
 void Engine::end_threads() {
   pool_.end();
-  for (HelperThread *helper : {guard_thread_.get(), lookout_.get()}) {
+  for (HelperThread *helper : {guard_thread_.get(), order_thread_.get(), lookout_.get()}) {
     if (helper == nullptr) continue;
     helper->parker.unpark();
     if (helper->handle.joinable()) helper->handle.join();
   }
+  order_page_.reset();
 }
 
 void Engine::main(WorkerThread &self) noexcept {

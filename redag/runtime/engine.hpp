@@ -24,7 +24,9 @@
 #include "redag/base/pi_mutex.hpp"
 #include "redag/base/result.hpp"
 #include "redag/base/thread_annotations.hpp"
+#include "redag/live/order_page.hpp"
 #include "redag/runtime/clock.hpp"
+#include "redag/runtime/common_order.hpp"
 #include "redag/runtime/device_threads.hpp"
 #include "redag/runtime/event_merge.hpp"
 #include "redag/runtime/executor_options.hpp"
@@ -57,6 +59,9 @@ struct EngineOptions {
   // os: the kernel's throttling. If there are DAGs of high criticality, jobs of the others are demoted to ordinary
   // threads before the kernel takes the processor from all.
   std::optional<Throttling> throttling;
+  // os, with a policy that rate_of() knows: from start() on, shares one order with the executors that have pages in
+  // this folder. `band` must be shared. Empty: has an order of its own.
+  std::string order_folder;
   bool realtime_threads = false;   // none, cooperative: all workers at SCHED_FIFO band.top_job
   std::vector<int> cpus;           // processors for the worker threads; empty: any, with `os` m of them
   std::size_t trace_capacity = 0;  // events that the rings hold between two drain(); 0: no events
@@ -94,6 +99,7 @@ struct StartedJob {
 struct TaskFigures {
   sched::Accounting jobs;
   Usage usage;
+  int priority = 0;          // os: SCHED_FIFO priority of its jobs that have inherited nothing
   std::uint32_t active = 0;  // jobs that have started and not ended
   std::uint32_t ready = 0;
   std::uint64_t late = 0;             // finished after the deadline
@@ -215,6 +221,8 @@ class Engine {
   [[nodiscard]] Duration gave_way() const;
   /// How often a job could have had a processor but waited for a thread, because all threads had jobs.
   [[nodiscard]] std::uint64_t thread_waits() const;
+  /// Why this executor cannot state its rates to those that share an order with it; empty: it can.
+  [[nodiscard]] std::string order_problem() const;
   /// Priority changes that the system refused while running, because rights were taken away.
   [[nodiscard]] std::uint64_t refused_priorities() const;
   /// Returns true if the calling thread is inside one of this engine's bodies.
@@ -235,6 +243,15 @@ class Engine {
 
   Result<void> start_threads(const std::vector<int> &cpus);
   Result<void> start_helper(HelperThread &helper, const char *name, int priority, std::function<void()> main);
+  Result<void> start_order();
+  void follow_order() noexcept;
+  Result<void> look_at_order();
+  void map_levels() REDAG_REQUIRES(lock_);
+  void tasks_changed() REDAG_REQUIRES(lock_) {
+    rates_changed_ = true;
+    map_levels();
+  }
+  void update_statement();
   void end_threads();
   void release_at(std::span<const Release> releases, Time at);
   void main(WorkerThread &self) noexcept;
@@ -309,6 +326,13 @@ class Engine {
   EventMerge merge_;       // drain() only
   Event idle_event_;
   std::unique_ptr<HelperThread> guard_thread_;  // os, throttled
+  // With `order_folder`. The page and the statement are start()'s, then the thread's.
+  std::unique_ptr<HelperThread> order_thread_;
+  std::unique_ptr<live::OwnOrderPage> order_page_;
+  live::OrderStatement statement_;
+  bool rates_changed_ REDAG_GUARDED_BY(lock_) = true;  // since the statement was made
+  CommonOrder order_ REDAG_GUARDED_BY(lock_);
+  std::string order_problem_ REDAG_GUARDED_BY(lock_);
   ReleaseThread *releases_ = nullptr;
   bool lets_wait_ = false;  // let_wait() has succeeded
   // let_wait(): wakes jobs that sleep.

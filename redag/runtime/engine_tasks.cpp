@@ -22,6 +22,7 @@ void Engine::bind(const Workload &workload, std::vector<Body> bodies) {
     for (std::size_t i = 0; i < dag.tasks.size(); ++i) ids.emplace_back(first + i);
     register_dag(DagId(d), dag, std::span(ids).subspan(first), std::span(bodies).subspan(first, dag.tasks.size()));
   }
+  tasks_changed();
 }
 
 AddedDag Engine::add_dag(const Dag &dag, std::vector<Body> bodies) {
@@ -36,6 +37,7 @@ AddedDag Engine::add_dag(const Dag &dag, std::vector<Body> bodies) {
   register_dag(added.dag, dag, added.tasks, bodies);
   dag_deadlines_.resize(std::max<std::size_t>(dag_deadlines_.size(), added.dag.value + 1));
   dag_deadlines_[added.dag.value] = dag.deadline;
+  tasks_changed();
   decide(locked, at);
   return added;
 }
@@ -53,6 +55,7 @@ TaskId Engine::add_task(DagId dag, std::uint32_t rank, const Task &task, Body bo
                       .has_predecessors = true,
                       .dag_deadline = dag.value < dag_deadlines_.size() ? dag_deadlines_[dag.value] : 0};
   register_task(id, task, role, body, std::move(listener));
+  tasks_changed();
   decide(locked, at);
   return id;
 }
@@ -65,6 +68,7 @@ void Engine::remove_dag(DagId dag) {
   REDAG_CHECK(dag.value < scheduler_->dag_slots(), "removal of a DAG that does not exist");
   for (const TaskId task : scheduler_->tasks_of(dag)) tasks_.remove(task, doomed);
   scheduler_->remove_dag(dag, at);
+  tasks_changed();
   decide(locked, at);
 }
 
@@ -75,6 +79,7 @@ void Engine::remove_task(TaskId task) {
   withdraw_if_halting(locked);
   tasks_.remove(task, doomed);
   scheduler_->remove_task(task, at);
+  tasks_changed();
   decide(locked, at);
 }
 
@@ -83,7 +88,9 @@ void Engine::set_timing(TaskId task, Duration period, Duration deadline) {
   Locked locked(*this);
   withdraw_if_halting(locked);
   scheduler_->set_timing(task, period, deadline, at);
+  tasks_[task].period = period;
   tasks_[task].deadline = deadline;
+  tasks_changed();
   decide(locked, at);
 }
 
@@ -127,8 +134,10 @@ Usage Engine::usage(TaskId task) const {
 TaskFigures Engine::figures(TaskId task) const {
   const LockGuard guard(lock_);
   const TaskEntry &entry = tasks_[task];
+  const std::uint32_t level = scheduler_->level(task);
   TaskFigures figures{.jobs = scheduler_->accounting(task),
                       .usage = entry.usage,
+                      .priority = os() && level != sched::kNoLevel ? placement_.priority_of_level(level) : 0,
                       .active = entry.busy,
                       .ready = scheduler_->ready(task),
                       .late = entry.late,

@@ -33,7 +33,8 @@ Executor::Impl::Impl(ExecutorOptions options) : options_(std::move(options)) {
                                 .ties = options_.ties,
                                 .workers = options_.workers,
                                 .threads = options_.threads,
-                                .cpus = options_.cpus});
+                                .cpus = options_.cpus,
+                                .share_order = options_.share_order});
   if (!setup) throw std::runtime_error(to_string(setup.error()));
   setup_ = *std::move(setup);
   options_.workers = setup_.config.workers;
@@ -65,6 +66,7 @@ Executor::Impl::Impl(ExecutorOptions options) : options_(std::move(options)) {
   engine.config = setup_.config;
   engine.config.reuse_ids = options_.trace_capacity == 0;  // in a trace an id means one task
   engine.band = setup_.band;
+  engine.order_folder = setup_.order_folder;
   engine.throttling = setup_.throttling;
   engine.cpus = options_.cpus;
   engine.trace_capacity = options_.trace_capacity;

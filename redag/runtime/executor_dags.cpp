@@ -250,6 +250,7 @@ void Executor::Impl::sample(live::Sample &sample) const {
     }
   }
   add_threads(sample, *engine_);
+  sample.alert = engine_->order_problem();
 }
 
 }  // namespace redag::runtime

@@ -80,6 +80,9 @@ struct ExecutorOptions {
   std::size_t trace_capacity = 0;  // events kept between two drain(); 0: none, or with `record` 32,768
   bool live = false;               // for `redag top`: a page of shared memory, and a thread that updates it
   bool measure = false;            // stats() has distributions of responses, and end to end
+  /// os, rate_monotonic or deadline_monotonic: shares one order with the other executors of this user that do so, also
+  /// in other processes (docs/robot.md). The variable REDAG_SHARE_ORDER overrides it.
+  bool share_order = false;
   /// Called for every deadline miss, on a thread of its own with the priority of the release timer: above all jobs,
   /// and without any lock. It may call every member of the Executor except wait(); stop() only requests the stop. While
   /// it runs, up to 1,024 further misses wait, and more are only counted. An exception stops the executor as that of a

@@ -165,6 +165,16 @@ void JobPlacement::apply(std::span<const ThreadPriorities::Change> changes) {
   }
 }
 
+void JobPlacement::follow_levels() {
+  std::vector<PriorityMove> moves;
+  for (const auto &thread : pool_.threads()) {
+    if (thread->stack.empty()) continue;
+    moves.push_back({thread->index, thread->level, priorities_.of(thread->index), priority_of(*thread)});
+  }
+  sort_without_inversion(moves);
+  for (const PriorityMove &move : moves) apply(priorities_.change(move.thread, move.to));
+}
+
 void JobPlacement::give_way(bool give_way) {
   giving_way_ = give_way;
   for (const auto &thread : pool_.threads()) {

@@ -89,6 +89,14 @@ class JobPlacement {
   /// Priority changes that the system refused.
   [[nodiscard]] std::uint64_t refused_priorities() const { return refused_priorities_; }
 
+  /// os: the priorities of the levels from now on, most urgent first. Threads that have jobs keep theirs until
+  /// follow_levels(), or until the scheduler tells new levels.
+  void set_levels(std::vector<int> priorities) { band_.given = std::move(priorities); }
+  /// os: gives the threads that have jobs the priorities of their levels, without inverting their order meanwhile.
+  void follow_levels();
+  /// os: the priority of a job with this level.
+  [[nodiscard]] int priority_of_level(std::uint32_t level) const { return band_.of_level(level); }
+
   /// os, throttled: from now on, jobs that are not spared run on ordinary threads, or no longer do so.
   void give_way(bool give_way);
   [[nodiscard]] bool gives_way() const { return giving_way_; }
@@ -138,9 +146,10 @@ class JobPlacement {
   void change_level(const sched::Dispatch &dispatch, const TaskTable &tasks);
   void set_priority_for_job(WorkerThread &thread, const Assignment &assignment);
   void move_priority(WorkerThread &thread, const Assignment &assignment);
-  /// A thread with a short job may keep a higher priority from its previous one, but not a demoted thread.
+  /// A thread with a short job may keep a higher priority from its previous one, but not a demoted thread, and not
+  /// where jobs of other processes can have a priority in between.
   [[nodiscard]] bool keeps_priority(const WorkerThread &thread, const Assignment &assignment) const {
-    return assignment.expected_short && !gives_way(thread);
+    return assignment.expected_short && !band_.shared && !gives_way(thread);
   }
   void apply(std::span<const ThreadPriorities::Change> changes);
   /// Returns true if the thread's job is demoted to an ordinary thread, because real-time threads are throttled.

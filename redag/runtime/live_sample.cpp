@@ -15,6 +15,7 @@ void fill(live::TaskSample &sample, const TaskFigures &figures) {
   sample.deferred = jobs.deferred;
   sample.preemptions = figures.preemptions;
   sample.cpu = figures.usage.total;
+  sample.priority = figures.priority;
   sample.active = figures.active;
   sample.ready = figures.ready;
   const std::uint64_t started_or_ready = std::uint64_t{figures.active} + figures.ready;

@@ -11,6 +11,8 @@
 #include <utility>
 
 #include "redag/base/text.hpp"
+#include "redag/live/writer.hpp"
+#include "redag/runtime/common_order.hpp"
 #include "redag/runtime/threads.hpp"
 
 namespace redag::runtime {
@@ -20,6 +22,14 @@ namespace {
 // the release timer. Below it is room for the user's own urgent threads above the jobs.
 constexpr int kUserRoom = 9;
 constexpr std::uint32_t kSpareThreads = 16;
+
+/// Says why the executor cannot share its order with others; empty: it can.
+std::string obstacle_to_sharing(const Mode &mode, PolicyKind policy, bool has_levels) {
+  if (mode.mode != PreemptionMode::Os) return fmt::format("the preemption is {} and not os", to_string(mode.mode));
+  if (has_levels) return fmt::format("{} gives the levels", kLevelsVariable);
+  if (!rate_of(policy, 1, 1)) return fmt::format("policy {} does not order by periods", to_string(policy));
+  return {};
+}
 
 }  // namespace
 
@@ -54,7 +64,17 @@ Result<PriorityBand> with_levels(PriorityBand band, const std::string &text) {
                       "raise its limit (rtprio), or plan with 'redag arrange --rtprio'");
   }
   band.top_job = band.given.front();
+  band.shared = true;
   return band;
+}
+
+Result<std::string> order_folder(bool wanted, const char *value) {
+  const std::string text = value == nullptr ? "" : value;
+  if (text == "1" || (text.empty() && wanted)) return std::string(live::kFolder);
+  if (text == "0" || text.empty()) return std::string();
+  if (text.front() == '/') return text;
+  return make_error(fmt::format("{} is {}", kShareOrderVariable, in_quotes(text)),
+                    "use 1, 0, or the absolute path of a folder that the processes share");
 }
 
 Result<Mode> resolve_mode(PreemptionMode wanted, PolicyKind policy, const PriorityBand &band) {
@@ -107,13 +127,26 @@ Result<Setup> set_up(const SetupRequest &request) {
     if (!band) return tl::unexpected(band.error());
     setup.band = *std::move(band);
   }
+  Result<std::string> folder = order_folder(request.share_order, std::getenv(kShareOrderVariable));
+  if (!folder) return tl::unexpected(folder.error());
+  if (!folder->empty()) {
+    const std::string obstacle = obstacle_to_sharing(setup.mode, request.policy, levels != nullptr);
+    if (obstacle.empty()) {
+      setup.order_folder = *std::move(folder);
+      setup.band.shared = true;
+    } else {
+      setup.warnings.push_back(fmt::format("no order is shared with other processes, because {}", obstacle));
+    }
+  }
   const std::size_t processors = request.cpus.empty() ? usable_cpus().size() : request.cpus.size();
   const std::uint32_t workers = request.workers == 0 ? static_cast<std::uint32_t>(processors) : request.workers;
   const std::uint32_t threads = std::max(request.threads == 0 ? workers + kSpareThreads : request.threads, workers);
   setup.config = make_config(setup.mode, workers, request.policy, setup.band, threads);
   setup.config.ties = request.ties;
   if (setup.mode.mode == PreemptionMode::Os) setup.throttling = realtime_throttling();
-  setup.warnings = mode_warnings(workers, processors, setup.throttling);
+  for (std::string &warning : mode_warnings(workers, processors, setup.throttling)) {
+    setup.warnings.push_back(std::move(warning));
+  }
   if (levels != nullptr && setup.mode.mode != PreemptionMode::Os) {
     setup.warnings.push_back(fmt::format("{} has no effect, because the preemption is {} and not os", kLevelsVariable,
                                          to_string(setup.mode.mode)));

@@ -25,6 +25,7 @@ struct PriorityBand {
   int timer = 0;
   // By level, from REDAG_LEVELS: priorities in an order of several processes. Empty: all of them, one for each level.
   std::vector<int> given = {};
+  bool shared = false;  // jobs of other processes have priorities among these
 
   /// Number of levels for jobs that are not demoted.
   [[nodiscard]] std::uint32_t levels() const {
@@ -50,6 +51,14 @@ inline constexpr int kHighestPriority = 90;
 /// arrange` computes them for executors that share a machine (docs/robot.md).
 inline constexpr const char *kLevelsVariable = "REDAG_LEVELS";
 
+/// The variable that lets the executors of a process share one order with those of other processes (docs/robot.md):
+/// `1`, `0`, or the folder of their pages.
+inline constexpr const char *kShareOrderVariable = "REDAG_SHARE_ORDER";
+
+/// Returns the folder of the pages of executors that share an order, for a value of REDAG_SHARE_ORDER; null: not set.
+/// Empty: no order is shared. Error: the value is none of those that the variable can have.
+[[nodiscard]] Result<std::string> order_folder(bool wanted, const char *value);
+
 /// Returns `band` with the priorities that `text` gives to its levels. Error: `text` is no list of descending
 /// priorities from 2, or they are not below the timer of the band.
 [[nodiscard]] Result<PriorityBand> with_levels(PriorityBand band, const std::string &text);
@@ -67,6 +76,7 @@ struct Setup {
   Mode mode;
   PriorityBand band;
   sched::Config config;
+  std::string order_folder;              // see EngineOptions
   std::optional<Throttling> throttling;  // for threads at SCHED_FIFO with `os`
   std::vector<std::string> warnings;
 
@@ -83,6 +93,7 @@ struct SetupRequest {
   std::uint32_t workers = 0;  // 0: one for each of `cpus`
   std::uint32_t threads = 0;  // os: jobs that can be started and unfinished at once; 0: some more than workers
   std::vector<int> cpus{};    // empty: the processors that the process may use
+  bool share_order = false;   // see ExecutorOptions
 };
 
 /// Returns what this machine can provide. Error: as resolve_mode().

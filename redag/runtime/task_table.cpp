@@ -35,6 +35,7 @@ void TaskTable::add(TaskId id, const Task &task, const TaskRole &role, Body &bod
   entry.set_limits(task);
   entry.is_high = role.is_high;
   ++(role.is_high ? high_ : others_);
+  entry.period = task.period;
   entry.deadline = task.deadline;
   if (role.is_sink && role.dag_deadline > 0) entry.dag_deadline = role.dag_deadline;
   if (measure_) entry.response = std::make_shared<Histogram>();

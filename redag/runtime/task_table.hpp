@@ -79,6 +79,7 @@ struct TaskEntry {
 
   bool is_high = false;  // of a DAG of high criticality
   Usage usage;
+  Duration period = 0;
   Duration deadline = 0;
   Duration dag_deadline = kNever;       // of a sink; kNever: none
   std::shared_ptr<Histogram> response;  // null: not measured

@@ -115,4 +115,12 @@ void ThreadPriorities::set(Thread &thread) {
   changes_.push_back(Change{static_cast<std::size_t>(&thread - threads_.data()), thread.priority});
 }
 
+void sort_without_inversion(std::span<PriorityMove> moves) {
+  const auto falls = [](const PriorityMove &move) { return move.to < move.from; };
+  std::sort(moves.begin(), moves.end(), [&](const PriorityMove &a, const PriorityMove &b) {
+    if (falls(a) != falls(b)) return falls(b);
+    return falls(a) ? a.level > b.level : a.level < b.level;
+  });
+}
+
 }  // namespace redag::runtime

@@ -39,6 +39,7 @@ class ThreadPriorities {
   /// A thread without a job waits with this priority. Its next job, if short, does not keep it.
   std::span<const Change> wait(std::size_t thread, int priority);
 
+  [[nodiscard]] int of(std::size_t thread) const { return threads_[thread].priority; }
   /// Returns true if a thread with a job has a real-time priority.
   [[nodiscard]] bool any_realtime() const { return realtime_ > 0; }
 
@@ -100,5 +101,18 @@ class ThreadPriorities {
   std::size_t realtime_ = 0;  // started threads whose job asks for a real-time priority
   bool unordered_ = false;    // a priority was kept although another job's lies in between
 };
+
+/// A thread that is to get another priority.
+struct PriorityMove {
+  std::size_t thread = 0;
+  std::uint32_t level = 0;  // of its job, 0 the most urgent
+  int from = 0;
+  int to = 0;
+};
+
+/// Brings the moves into a sequence after each step of which no thread has a lower priority than one of a less urgent
+/// level: rises, the most urgent level first, then falls, the least urgent first. Requires that neither `from` nor `to`
+/// increases with the level.
+void sort_without_inversion(std::span<PriorityMove> moves);
 
 }  // namespace redag::runtime

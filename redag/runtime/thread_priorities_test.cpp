@@ -150,5 +150,34 @@ RC_GTEST_PROP(ThreadPriorities, MoreJobsThanProcessorsAreAlwaysInOrder, ()) {
   }
 }
 
+// Both maps from level to priority are monotone, as those before and after a change of a common order.
+RC_GTEST_PROP(PriorityMoves, NeverInvertAnOrder, ()) {
+  const auto descending = [](std::size_t count) {
+    std::vector<int> priorities(count);
+    for (int &priority : priorities) priority = *rc::gen::inRange(2, 12);
+    std::sort(priorities.rbegin(), priorities.rend());
+    return priorities;
+  };
+  const auto levels = *rc::gen::inRange<std::size_t>(1, 8);
+  const std::vector<int> from = descending(levels);
+  const std::vector<int> to = descending(levels);
+  std::vector<PriorityMove> moves;
+  for (std::size_t thread = *rc::gen::inRange<std::size_t>(1, 12); thread > 0; --thread) {
+    const auto level = *rc::gen::inRange<std::uint32_t>(0, static_cast<std::uint32_t>(levels));
+    moves.push_back({thread, level, from[level], to[level]});
+  }
+  sort_without_inversion(moves);
+  std::vector<int> now;
+  for (const PriorityMove &move : moves) now.push_back(move.from);
+  for (std::size_t step = 0; step < moves.size(); ++step) {
+    now[step] = moves[step].to;
+    for (std::size_t a = 0; a < moves.size(); ++a) {
+      for (std::size_t b = 0; b < moves.size(); ++b) {
+        RC_ASSERT(moves[a].level >= moves[b].level || now[a] >= now[b]);
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace redag::runtime

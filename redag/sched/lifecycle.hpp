@@ -101,6 +101,10 @@ class Lifecycle final : public Scheduler {
                       .no_data = state.no_data};
   }
   [[nodiscard]] std::uint32_t ready(TaskId task) const override { return table_.tasks[task.value].ready_count; }
+  [[nodiscard]] std::uint32_t level(TaskId task) const override {
+    const TaskState &state = table_.tasks[task.value];
+    return state.life == TaskLife::Gone ? kNoLevel : state.level;
+  }
   [[nodiscard]] std::uint64_t thread_waits() const override { return table_.thread_waits; }
 
   /// What the scheduler knows. Tests see there how memory grows.

@@ -65,6 +65,9 @@ inline constexpr std::size_t kMostReleasesAtOnce = 256;
 /// For dispatch(): start as many jobs as there are places.
 inline constexpr std::uint32_t kNoLimit = 0xffffffff;
 
+/// The level of a task that is gone.
+inline constexpr std::uint32_t kNoLevel = 0xffffffff;
+
 enum class DispatchKind : std::uint8_t {
   Start,   // the job begins on `worker`
   Resume,  // the job, suspended until now, continues on `worker`
@@ -174,6 +177,9 @@ class Scheduler {
   [[nodiscard]] virtual Accounting accounting(TaskId task) const = 0;
   /// Number of ready, unstarted jobs. Other unstarted jobs wait for predecessors.
   [[nodiscard]] virtual std::uint32_t ready(TaskId task) const = 0;
+  /// The level of the task's jobs that have inherited nothing and are not demoted; kNoLevel: it is removed and has no
+  /// job left, or levels mean nothing to this scheduler.
+  [[nodiscard]] virtual std::uint32_t level(TaskId /*task*/) const { return kNoLevel; }
   /// How often a job found a worker and only Config::max_started kept it from starting.
   [[nodiscard]] virtual std::uint64_t thread_waits() const { return 0; }
 };

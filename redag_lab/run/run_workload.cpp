@@ -144,6 +144,7 @@ class Run {
     runtime::EngineOptions engine;
     engine.config = setup->config;
     engine.band = setup->band;
+    engine.order_folder = setup->order_folder;
     engine.throttling = setup->throttling;
     engine.realtime_threads = options_.realtime_threads;
     engine.cpus = cpus;

@@ -1,0 +1,14 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// Files that only their owner can open. No state; any thread.
+#pragma once
+
+#include <string>
+
+namespace redag::live {
+
+/// Creates a new file for reading and writing. Returns its descriptor; negative, with errno, on an error.
+[[nodiscard]] int create_owned_file(const std::string &path);
+
+}  // namespace redag::live
