@@ -10,6 +10,7 @@
 
 #include "benchmarks/graphs.hpp"
 #include "benchmarks/scheduler_loop.hpp"
+#include "benchmarks/waiting_pair.hpp"
 #include "counted.hpp"
 #include "redag/base/check.hpp"
 #include "redag/runtime/setup.hpp"
@@ -40,21 +41,35 @@ std::uint64_t scheduler_graph(std::uint64_t least, Shape shape, sched::Preemptio
   return jobs;
 }
 
+// Returns false, and says why, if that is an error.
+bool is_good(const auto &result) {
+  if (!result) std::fprintf(stderr, "%s\n", to_string(result.error()).c_str());
+  return result.has_value();
+}
+
+Result<runtime::Setup> one_worker(PreemptionMode mode) {
+  return runtime::set_up({.preemption = mode, .policy = PolicyKind::Fixed, .workers = 1});
+}
+
 std::uint64_t engine_graph(std::uint64_t least, Shape shape, PreemptionMode mode) {
-  const Result<runtime::Setup> setup = runtime::set_up({.preemption = mode, .policy = PolicyKind::Fixed, .workers = 1});
-  if (!setup) {
-    std::fprintf(stderr, "%s\n", to_string(setup.error()).c_str());
-    return 0;
-  }
+  const Result<runtime::Setup> setup = one_worker(mode);
+  if (!is_good(setup)) return 0;
   begin_virtual_time();
   EngineGraph graph(shape, *setup, 0);
-  if (const Result<void> started = graph.start(); !started) {
-    std::fprintf(stderr, "%s\n", to_string(started.error()).c_str());
-    return 0;
-  }
+  if (!is_good(graph.start())) return 0;
   const std::uint64_t rounds = rounds_of(least, shape);
   graph.run(static_cast<std::uint32_t>(rounds));
   return rounds * nodes_of(shape);
+}
+
+std::uint64_t engine_waits(std::uint64_t least, PreemptionMode mode) {
+  const Result<runtime::Setup> setup = one_worker(mode);
+  if (!is_good(setup)) return 0;
+  begin_virtual_time();
+  WaitingPair pair(*setup);
+  if (!is_good(pair.start())) return 0;
+  pair.run(least);
+  return least;
 }
 
 std::vector<Case> all_cases() {
@@ -78,6 +93,8 @@ std::vector<Case> all_cases() {
       add("engine/" + std::string(to_string(mode)) + "/" + std::string(kShapes[static_cast<std::size_t>(shape)]),
           [=](std::uint64_t least) { return engine_graph(least, shape, mode); });
     }
+    add("engine/" + std::string(to_string(mode)) + "/wait",
+        [=](std::uint64_t least) { return engine_waits(least, mode); });
   }
   return cases;
 }

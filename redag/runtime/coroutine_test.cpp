@@ -130,21 +130,20 @@ TEST_P(EveryMode, ASleepEndsNotBeforeItsTime) {
   executor.run();
 }
 
-TEST_P(EveryMode, SleepersWakeInTheOrderOfTheirTimes) {
-  ExecutorOptions options = one_worker(mode());
-  Executor executor(options);
-  const auto start = std::chrono::steady_clock::now() + 50ms;
-  std::vector<int> order;
-  for (const int place : {2, 0, 3, 1}) {
-    executor.add(once("sleeper_" + std::to_string(place), [&, place]() -> Coroutine {
-      co_await sleep_until(start + place * 2ms);
-      order.push_back(place);
-      if (order.size() == 4) executor.stop();
+TEST_P(EveryMode, AllSleepersWakeAndNoneEarly) {
+  constexpr int kSleepers = 20;
+  Executor executor(one_worker(mode()));
+  std::atomic<int> woken{0};
+  for (int i = 0; i < kSleepers; ++i) {
+    executor.add(once("sleeper_" + std::to_string(i), [&, i]() -> Coroutine {
+      const auto until = std::chrono::steady_clock::now() + (7 * i % kSleepers) * 1ms;
+      co_await sleep_until(until);
+      EXPECT_GE(std::chrono::steady_clock::now(), until);
+      if (++woken == kSleepers) executor.stop();
     }));
   }
   executor.run();
-  ASSERT_EQ(order.size(), 4U);
-  EXPECT_EQ(order.back(), 3);
+  EXPECT_EQ(woken.load(), kSleepers);
 }
 
 TEST_P(EveryMode, ADeviceServesOneJobInEachSlot) {
@@ -393,6 +392,18 @@ TEST_P(EveryMode, TheStopEndsWaits) {
     }
     EXPECT_EQ(executor.stats(dags[2])[0].jobs.finished, 1U);
   }
+}
+
+TEST(Coroutine, ADeviceMayStopTheExecutor) {
+  Executor executor(with_gpu());
+  const DeviceHandle gpu = executor.device("gpu");
+  bool ended = false;
+  executor.add(once("job", [&]() -> Coroutine {
+    co_await gpu.run([&] { executor.stop(); });
+    ended = true;
+  }));
+  executor.run();
+  EXPECT_TRUE(ended);
 }
 
 TEST(Coroutine, ADestructorWaitsForTheDevice) {
@@ -648,6 +659,10 @@ TEST_P(EveryMode, TheCheckerAcceptsARecordedRun) {
   ASSERT_TRUE(trace.has_value()) << to_string(trace.error());
   ASSERT_EQ(trace->info.workload.platform.devices.size(), 1U);
   EXPECT_EQ(trace->info.workload.platform.devices[0].name, "gpu");
+  const Task &detect = trace->info.workload.dags[0].tasks[1];
+  ASSERT_EQ(detect.waits.size(), 1U) << "measured, as its wcet is";
+  EXPECT_GE(detect.waits[0].longest, 300 * kMicrosecond);
+  EXPECT_TRUE(trace->info.workload.dags[0].tasks[0].waits.empty());
   const auto waits = std::count_if(trace->events.begin(), trace->events.end(),
                                    [](const JobEvent &event) { return event.kind == JobEventKind::Waits; });
   EXPECT_GE(waits, 100);

@@ -8,6 +8,13 @@
 #include "redag/base/check.hpp"
 
 namespace redag::runtime {
+namespace {
+
+thread_local const DeviceThreads *devices_of_this_thread = nullptr;
+
+}  // namespace
+
+bool DeviceThreads::is_this_thread() const { return devices_of_this_thread == this; }
 
 DeviceThreads::DeviceThreads(const std::vector<Device> &devices) : devices_(devices), idle_(devices.size()) {
   for (std::size_t d = 0; d < devices.size(); ++d) {
@@ -51,6 +58,7 @@ void DeviceThreads::serve(detail::Wait &wait) {
 }
 
 void DeviceThreads::main(DeviceThread &self, const Served &served) noexcept {
+  devices_of_this_thread = this;
   for (;;) {
     self.parker.park();
     detail::Wait *const wait = std::exchange(self.wait, nullptr);

@@ -41,6 +41,8 @@ class DeviceThreads {
 
   /// Lets an idle thread of the device serve. The scheduler has found a free slot.
   void serve(detail::Wait &wait);
+  /// Returns true if the calling thread is one of them. After start().
+  [[nodiscard]] bool is_this_thread() const;
   void add_idle(DeviceThread &thread) { idle_[thread.device.value].push_back(&thread); }
 
  private:

@@ -102,6 +102,8 @@ struct TaskFigures {
   int priority = 0;          // os: SCHED_FIFO priority of its jobs that have inherited nothing
   std::uint32_t active = 0;  // jobs that have started and not ended
   std::uint32_t ready = 0;
+  std::uint32_t most_waits = 0;       // of a job
+  Duration longest_waits = 0;         // of a job, together: from each co_await until it is woken
   std::uint64_t late = 0;             // finished after the deadline
   std::uint64_t late_end_to_end = 0;  // of a sink: finished after the DAG's deadline
   // Zero or null unless EngineOptions::measure is set:
@@ -227,6 +229,8 @@ class Engine {
   [[nodiscard]] std::uint64_t refused_priorities() const;
   /// Returns true if the calling thread is inside one of this engine's bodies.
   [[nodiscard]] bool in_body() const noexcept { return current_job() != nullptr; }
+  /// Returns true if the calling thread serves a job at one of this engine's devices.
+  [[nodiscard]] bool in_service() const { return devices_.is_this_thread(); }
   /// The job that the calling thread runs in this engine, the topmost one of several. Null outside bodies.
   [[nodiscard]] const RunningJob *current_job() const noexcept;
   [[nodiscard]] std::uint32_t thread_count() const { return pool_.size(); }

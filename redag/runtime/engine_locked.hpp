@@ -30,11 +30,6 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
     }
     at_once_ = engine_.lock_.lock();
   }
-  struct WakesAtOnce {};
-  /// Wakes ordinary threads under the lock, too.
-  Locked(Engine &engine, WakesAtOnce /*tag*/) REDAG_ACQUIRE(engine.lock_) : engine_(engine), wake_ups_(true) {
-    at_once_ = engine_.lock_.lock();
-  }
   ~Locked() REDAG_RELEASE() {
     const bool woke = engine_.lock_.unlock();
     if (delayed_ != nullptr) *delayed_ = woke || wake_ups_.any();

@@ -140,6 +140,8 @@ TaskFigures Engine::figures(TaskId task) const {
                       .priority = os() && level != sched::kNoLevel ? placement_.priority_of_level(level) : 0,
                       .active = entry.busy,
                       .ready = scheduler_->ready(task),
+                      .most_waits = entry.most_waits,
+                      .longest_waits = entry.longest_waits,
                       .late = entry.late,
                       .late_end_to_end = entry.late_end_to_end,
                       .preemptions = entry.preemptions,

@@ -65,12 +65,12 @@ std::optional<Time> Engine::suspend(Taker &taker, RunningJob &running) {
     job.used_wcet_low = running.used_wcet_low;
     job.used_budget = running.used_budget;
     job.reported = running.reported;
-    waiting_.add(job);
+    waiting_.add(job, at);
     placement_.leave(self);
     scheduler_->wait(running.slot, job.wait->device, at);
     const Time alarm = waiting_.next_alarm();
     if (!waiting_.begin(*job.wait)) {
-      waiting_.end(running.slot);
+      waiting_.end(running.slot, at);
       scheduler_->wake(running.slot, at);
     } else if (waiting_.next_alarm() < alarm) {
       sleepers_->changed();
@@ -83,16 +83,16 @@ std::optional<Time> Engine::suspend(Taker &taker, RunningJob &running) {
 
 void Engine::wake(Locked &locked, JobSlot job, Time at) {
   withdraw_if_halting(locked);
-  waiting_.end(job);
+  waiting_.end(job, at);
   scheduler_->wake(job, at);
 }
 
-// Once the lock is released, the job may end, and join() return.
+// Once the lock is released, the job may end. join() then waits for `wakes_`.
 void Engine::wake(JobSlot job) {
   const Time at = now();
   std::shared_ptr<InProgress> wakes;
   {
-    Locked locked(*this, Locked::WakesAtOnce());
+    Locked locked(*this);
     wakes = wakes_;
     wakes->begin();
     wake(locked, job, at);

@@ -218,7 +218,9 @@ void Executor::Impl::stop() {
   if (started_ && !is_own_thread()) finish();
 }
 
-bool Executor::Impl::is_own_thread() const { return engine_->in_body() || (misses_ && misses_->is_this_thread()); }
+bool Executor::Impl::is_own_thread() const {
+  return engine_->in_body() || engine_->in_service() || (misses_ && misses_->is_this_thread());
+}
 
 void Executor::Impl::finish() {
   const LockGuard guard(finishing_);

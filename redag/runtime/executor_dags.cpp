@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "redag/model/validate.hpp"
 #include "redag/runtime/coroutine_body.hpp"
 #include "redag/runtime/dag_mistakes.hpp"
 #include "redag/runtime/distribution_content.hpp"
@@ -33,6 +34,16 @@ void state_wcet(Task &task, Duration longest) {
   task.bcet = std::min(task.bcet, task.wcet);
   task.wcet_low = std::min(task.wcet_low, task.wcet);
   task.execution = {};
+}
+
+// A trace needs the waits of a task. The most and the longest so far stand for them, without their devices: the time in
+// the queues is part of the waits.
+void state_waits(Task &task, std::uint32_t most, Duration longest) {
+  const auto count = std::min<Duration>({most, Duration{kMaxWaits}, task.wcet - 1});
+  for (Duration wait = 0; wait < count; ++wait) {
+    task.waits.push_back({.after = (wait + 1) * task.wcet / (count + 1),
+                          .longest = std::max<Duration>(1, (longest + count - 1) / count)});
+  }
 }
 
 }  // namespace
@@ -223,7 +234,9 @@ trace::RunInfo Executor::Impl::run_info() const {
     for (int n = 2; !names.insert(dag.name).second; ++n) dag.name = fmt::format("{} #{}", added.dag.name, n);
     for (std::size_t i = 0; i < dag.tasks.size(); ++i, ++position) {
       Task &task = dag.tasks[i];
-      state_wcet(task, engine_->usage(added.ids.tasks[i]).longest);
+      const TaskFigures figures = engine_->figures(added.ids.tasks[i]);
+      state_wcet(task, figures.usage.longest);
+      state_waits(task, figures.most_waits, figures.longest_waits);
       if (added.sources[i] != nullptr) info.event_tasks.emplace_back(position);
       if (task.activation == Activation::Timer) task.offset += added.base;
     }

@@ -90,6 +90,8 @@ struct TaskEntry {
   std::uint64_t preemptions = 0;
   std::uint64_t withdrawn = 0;    // jobs skipped by halt()
   std::uint64_t cancelled = 0;    // jobs whose wait was ended by halt()
+  std::uint32_t most_waits = 0;   // of a job
+  Duration longest_waits = 0;     // of a job, together
   std::uint32_t concurrency = 0;  // jobs that can be in progress at once
   std::uint32_t busy = 0;         // jobs that have started and not ended
   std::uint32_t short_jobs = 0;   // consecutive short jobs up to now; at most kStreak

@@ -9,6 +9,7 @@
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/event_state.hpp"
 #include "redag/runtime/frame_pool.hpp"
+#include "redag/runtime/task_table.hpp"
 
 namespace redag::runtime {
 
@@ -31,6 +32,14 @@ bool WaitingJobs::begin(detail::Wait &wait) {
   sleepers_.push_back({wait.until, wait.job});
   std::push_heap(sleepers_.begin(), sleepers_.end());
   return true;
+}
+
+void WaitingJobs::end(JobSlot slot, Time now) {
+  WaitingJob &job = *by_slot_[slot.value];
+  job.wait->is_over = true;
+  job.waited += std::max<Duration>(0, now - job.since);
+  job.entry->most_waits = std::max(job.entry->most_waits, ++job.waits);
+  job.entry->longest_waits = std::max(job.entry->longest_waits, job.waited);
 }
 
 JobSlot WaitingJobs::take_sleeper() {

@@ -33,6 +33,9 @@ struct WaitingJob {
   Time begun = 0;        // of the body
   Duration charged = 0;  // processor time
   Duration earlier = 0;  // that it was in progress on a thread
+  Time since = 0;        // of its last wait
+  Duration waited = 0;   // its waits together, queues of devices included
+  std::uint32_t waits = 0;
   bool measured = false;
   bool used_wcet_low = false;
   bool used_budget = false;
@@ -51,7 +54,8 @@ class WaitingJobs {
   void reserve(std::size_t jobs);
 
   /// The job has left its thread, and waits or is woken.
-  void add(WaitingJob &job) {
+  void add(WaitingJob &job, Time now) {
+    job.since = now;
     const std::size_t slot = job.job.slot.value;
     if (slot >= by_slot_.size()) by_slot_.resize(std::bit_ceil(slot + 1), nullptr);
     by_slot_[slot] = &job;
@@ -78,7 +82,7 @@ class WaitingJobs {
   /// Begins the wait of a job, except at a device, where it queues first. Returns false if the wait is over already.
   [[nodiscard]] bool begin(detail::Wait &wait);
   /// The wait of a job is over: it is woken.
-  void end(JobSlot slot) { by_slot_[slot.value]->wait->is_over = true; }
+  void end(JobSlot slot, Time now);
   /// A device has a slot for the job: a thread of the device begins to serve it. After cancel_all() the job's wait is
   /// cancelled instead.
   void serve(JobSlot slot);
