@@ -66,7 +66,7 @@ using Periods = std::array<int, kJobs>;  // ms
   if (!engine.start()) ::_exit(1);
   engine.set_origin(monotonic_now());
   for (std::size_t i = 0; i < kJobs; ++i) engine.release(TaskId(i), engine.now());
-  while (::read(commands, periods.data(), sizeof(periods)) == sizeof(periods)) {
+  while (::read(commands, periods.data(), sizeof(periods)) == static_cast<ssize_t>(sizeof(periods))) {
     for (std::size_t i = 0; i < kJobs; ++i) {
       engine.set_timing(TaskId(i), periods[i] * kMillisecond, periods[i] * kMillisecond);
     }

@@ -59,7 +59,8 @@ redag::runtime::Setup set_up(const ReDAGOptions &options) {
                                        .ties = options.ties,
                                        .workers = options.workers,
                                        .threads = options.threads,
-                                       .cpus = options.cpus});
+                                       .cpus = options.cpus,
+                                       .share_order = options.share_order});
   if (!setup) throw std::runtime_error(to_string(setup.error()));
   return *std::move(setup);
 }
@@ -97,6 +98,7 @@ std::unique_ptr<redag::runtime::Engine> ReDAGExecutor::Core::make_engine() {
   options.config = setup_.config;
   options.config.reuse_ids = options_.trace_capacity == 0;  // in a trace an id stands for one task
   options.band = setup_.band;
+  options.order_folder = setup_.order_folder;
   options.throttling = setup_.throttling;
   options.cpus = options_.cpus;
   options.trace_capacity = options_.trace_capacity;
@@ -480,7 +482,7 @@ std::vector<std::string> ReDAGExecutor::Core::warnings() const {
 std::string ReDAGExecutor::Core::alert() const {
   std::vector<Deadlock> lasting = notes_.deadlocks();
   std::erase_if(lasting, [](const Deadlock &deadlock) { return deadlock.ended != kNever; });
-  if (lasting.empty()) return {};
+  if (lasting.empty()) return engine_->order_problem();
   const Deadlock &first = lasting.front();
   std::string text =
       fmt::format("{}: {} waits for {}, which cannot get {}", first.certain ? "deadlock" : "possible deadlock",

@@ -319,6 +319,11 @@ ReDAGOptions declare_options(rclcpp::Node &node) {
   options.live = reader.flag(
       {"live", "Let `redag top` show the executor; costs a page of memory and two updates a second", "true or false"},
       true);
+  options.share_order = reader.flag({"share_order",
+                                     "With preemption os, share one order of priorities with the other executors of "
+                                     "this user that do so, also in other processes",
+                                     "true or false"},
+                                    false);
   const bool counts_responses = read_bounds(reader) && options.workload && has_all_wcets(*options.workload);
   if (!read_trace(reader).empty() || counts_responses) options.trace_capacity = kTraceCapacity;
   return options;

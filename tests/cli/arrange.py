@@ -256,6 +256,17 @@ dags:
         self.expect(result, 2)
         self.assertIn("REDAG_LEVELS is '20,30', which is no list of priorities", result.stderr)
 
+    def test_a_shared_order_is_on_or_off(self):
+        workload = self.write("one.yaml", "platform: {preemption: none}\ndags:\n  - name: d\n    tasks:\n"
+                              "      - {name: a, wcet: 100us, period: 5ms}\n")
+        def run(value):
+            return subprocess.run([PROGRAM, "run", workload, "--duration", "50ms"],
+                                  env={**os.environ, "REDAG_SHARE_ORDER": value},
+                                  capture_output=True, text=True, check=False)
+        self.expect(run("yes"), 2, "REDAG_SHARE_ORDER is 'yes'")
+        self.assertIn("no order is shared with other processes, because the preemption is none", run("1").stderr)
+        self.assertNotIn("no order is shared", run("0").stderr)
+
 
 if __name__ == "__main__":
     main()

@@ -117,6 +117,25 @@ class Top(Case):
         self.expect(redag("top", "--folder", self.folder), 1, "no running executor")
         self.expect(redag("top", "--folder", self.folder, "--list"), 1, "no running executor")
 
+    def test_all_in_one_table(self):
+        with tempfile.TemporaryDirectory(dir="/dev/shm") as name:
+            folder = pathlib.Path(name)
+            self.expect(redag("top", "--folder", folder, "--all"), 1, "no running executor")
+            first, second = self.start(), self.start()
+            for process in first, second:
+                self.linked(folder, process)
+            table = self.document(redag("top", "--folder", folder, "--all", "--json"), "redag.live-all/1")
+            self.assertEqual({(task["pid"], task["dag"], task["name"]) for task in table["tasks"]},
+                             {(process.pid, dag, task) for process in (first, second)
+                              for dag, task in (("fast", "sense"), ("fast", "act"), ("slow", "plan"))})
+            periods = [task["period_ns"] for task in table["tasks"]]
+            self.assertEqual(periods, sorted(periods))
+            self.assertEqual({task["priority"] for task in table["tasks"]}, {None}, "the workload has preemption none")
+            text = self.expect(redag("top", "--folder", folder, "--all"), 0).stdout
+            for word in ["level", "period", "fast.sense", str(first.pid), str(second.pid)]:
+                self.assertIn(word, text)
+            self.expect(redag("top", first.pid, "--folder", folder, "--all"), 2)
+
     def test_of_several_one_has_to_be_named(self):
         with tempfile.TemporaryDirectory(dir="/dev/shm") as name:
             folder = pathlib.Path(name)

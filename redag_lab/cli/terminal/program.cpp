@@ -108,6 +108,7 @@ constexpr std::array kCommands = {
     Entry{"top", "Watch a running executor: rates, response times, misses, queues", add_top,
           "  redag top\n"
           "  redag top --list\n"
+          "  redag top --all --once\n"
           "  redag top 1234 --interval 500ms --sort misses\n"
           "  redag top 1234 --once --json\n"},
     Entry{"serve", "Show the running executors in a browser of this machine", add_serve,

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "redag_lab/cli/top/live_figures.hpp"
+#include "redag_lab/cli/top/machine_table.hpp"
 
 namespace redag::cli {
 namespace {
@@ -48,6 +49,15 @@ Json histogram_json(const live::page::Spread &spread) {
   return {{"recent", classes_json(spread.recent)}, {"all", classes_json(spread.all)}};
 }
 
+Json task_json(const live::TaskFrame &task, const live::Frame &frame) {
+  Json row = {{"dag", frame.dags[task.dag].name},        {"name", task.name},
+              {"period_ns", or_null(task.period)},       {"deadline_ns", or_null(task.deadline)},
+              {"bound_ns", or_null(task.bound)},         {"priority", or_null(task.priority)},
+              {"histogram", histogram_json(task.spread)}};
+  row.update(figures_json(task.figures, frame));
+  return row;
+}
+
 }  // namespace
 
 Json to_json(const live::Listed &listed, const live::Page &page, Time now) {
@@ -87,13 +97,7 @@ Json to_json(const live::Listed &listed, const live::Page &page, Time now) {
     row.update(figures_json(dag.figures, frame));
     document["dags"].push_back(std::move(row));
   }
-  for (const live::TaskFrame &task : frame.tasks) {
-    Json row = {{"dag", frame.dags[task.dag].name},  {"name", task.name},
-                {"period_ns", or_null(task.period)}, {"deadline_ns", or_null(task.deadline)},
-                {"bound_ns", or_null(task.bound)},   {"histogram", histogram_json(task.spread)}};
-    row.update(figures_json(task.figures, frame));
-    document["tasks"].push_back(std::move(row));
-  }
+  for (const live::TaskFrame &task : frame.tasks) document["tasks"].push_back(task_json(task, frame));
   return document;
 }
 
@@ -115,6 +119,18 @@ Json to_json(const std::vector<live::Listed> &pages, Time now) {
     list.push_back(std::move(row));
   }
   return {{"format", "redag.live-list/1"}, {"executors", std::move(list)}};
+}
+
+Json machine_json(const std::vector<live::Listed> &pages, const LiveView &view) {
+  Json tasks = Json::array();
+  for (const MachineRow &row : machine_rows(pages, view)) {
+    const live::Listed &listed = pages[row.page];
+    const live::Frame &frame = listed.page->frame;
+    Json task = {{"pid", listed.pid}, {"number", listed.number}, {"executor", frame.name}};
+    task.update(task_json(frame.tasks[row.task], frame));
+    tasks.push_back(std::move(task));
+  }
+  return {{"format", "redag.live-all/1"}, {"tasks", std::move(tasks)}};
 }
 
 }  // namespace redag::cli

@@ -8,6 +8,7 @@
 
 #include "redag/live/reader.hpp"
 #include "redag_lab/cli/terminal/json.hpp"
+#include "redag_lab/cli/top/live_figures.hpp"
 
 namespace redag::cli {
 
@@ -15,5 +16,7 @@ namespace redag::cli {
 [[nodiscard]] Json to_json(const live::Listed &listed, const live::Page &page, Time now);
 /// Returns "redag.live-list/1".
 [[nodiscard]] Json to_json(const std::vector<live::Listed> &pages, Time now);
+/// Returns "redag.live-all/1": the rows of machine_text().
+[[nodiscard]] Json machine_json(const std::vector<live::Listed> &pages, const LiveView &view);
 
 }  // namespace redag::cli

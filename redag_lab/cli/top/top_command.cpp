@@ -15,6 +15,7 @@
 #include "redag_lab/cli/terminal/screen.hpp"
 #include "redag_lab/cli/top/attachment.hpp"
 #include "redag_lab/cli/top/live_json.hpp"
+#include "redag_lab/cli/top/machine_table.hpp"
 #include "redag_lab/cli/top/top_loop.hpp"
 #include "redag_lab/cli/top/top_screen.hpp"
 
@@ -26,6 +27,7 @@ struct Options {
   std::string folder = live::kFolder;
   Duration interval = kSecond;
   bool list = false;
+  bool all = false;
   bool once = false;
   bool json = false;
   bool ascii = false;
@@ -86,6 +88,30 @@ int show_once(const Options &options, const std::optional<LiveTarget> &target, C
   return kExitOk;
 }
 
+int show_all(const Options &options, Console &console) {
+  const StreamTraits &out = console.out_traits();
+  if (!options.once && !options.json && Screen::is_possible()) {
+    return watch_machine({.folder = options.folder,
+                          .interval = options.interval,
+                          .target = std::nullopt,
+                          .view = options.view,
+                          .glyphs = Glyphs{options.ascii},
+                          .colour = out.colour});
+  }
+  const std::vector<live::Listed> pages = live::list_pages(options.folder);
+  if (options.json) {
+    console.print(to_text(machine_json(pages, options.view)));
+  } else if (!pages.empty()) {
+    console.print(machine_text(pages, options.view, out.width, out.colour));
+  }
+  for (const live::Listed &listed : pages) {
+    if (!listed.page) console.note(listed.page.error());
+  }
+  if (!pages.empty()) return kExitOk;
+  console.error("no running executor publishes a live page", kHowTo);
+  return kExitNo;
+}
+
 int top(const Options &options, Console &console) {
   std::optional<LiveTarget> target;
   if (!options.target.empty()) {
@@ -97,6 +123,7 @@ int top(const Options &options, Console &console) {
     }
   }
   if (options.list) return list(options, console);
+  if (options.all) return show_all(options, console);
   if (options.once || options.json) return show_once(options, target, console);
   if (!Screen::is_possible()) {
     console.note("the output is not a terminal that can be drawn on: one frame is printed, as with --once\n");
@@ -121,13 +148,17 @@ Action add_top(CLI::App &app) {
   CLI::Option *target = app.add_option("PID", options->target,
                                        "Process ID; by default the only running executor, or a list to choose from");
   CLI::Option *list = app.add_flag("--list", options->list, "List the running executors")->excludes(target);
+  CLI::Option *all =
+      app.add_flag("--all", options->all, "Show the tasks of all executors in one table, most urgent first")
+          ->excludes(target)
+          ->excludes(list);
   app.add_flag("--once", options->once, "Print one frame as text and exit")->excludes(list);
   app.add_flag("--json", options->json, "Print one frame (or the list) as a JSON document and exit");
   add_duration(app, "--interval", options->interval, "Time between two updates");
-  add_choice(app, "--sort", view.order, choices_of(kOrders), "Order of the rows");
+  add_choice(app, "--sort", view.order, choices_of(kOrders), "Order of the rows")->excludes(all);
   app.add_flag("--reverse", view.reversed, "Reverse the order");
   app.add_option("--filter", view.filter, "Show only DAGs and tasks whose name contains this")->type_name("TEXT");
-  app.add_flag("--dags", view.dags_only, "Show only DAGs, not their tasks");
+  app.add_flag("--dags", view.dags_only, "Show only DAGs, not their tasks")->excludes(all);
   app.add_flag("--since-start", view.since_start, "Show figures since the start instead of over the last seconds");
   app.add_flag("--ascii", options->ascii, "Draw graphs with ASCII characters");
   add_pages_folder(app, options->folder);

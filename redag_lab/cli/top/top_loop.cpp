@@ -4,11 +4,16 @@
 #include "redag_lab/cli/top/top_loop.hpp"
 
 #include <algorithm>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "redag/runtime/clock.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/screen.hpp"
 #include "redag_lab/cli/terminal/signals.hpp"
+#include "redag_lab/cli/top/machine_table.hpp"
 #include "redag_lab/cli/top/top_screen.hpp"
 
 namespace redag::cli {
@@ -93,5 +98,28 @@ class Top {
 }  // namespace
 
 int run_top(const TopOptions &options) { return Top(options).run(); }
+
+int watch_machine(const TopOptions &options) {
+  const InterruptGuard guard;
+  Screen screen(options.colour);
+  while (!InterruptGuard::interrupted()) {
+    const Time next = runtime::monotonic_now() + options.interval;
+    const std::vector<live::Listed> pages = live::list_pages(options.folder);
+    for (Time now = 0; now < next && !InterruptGuard::interrupted(); now = runtime::monotonic_now()) {
+      const Screen::Size size = screen.size();
+      std::istringstream text(machine_text(pages, options.view, size.columns, false));
+      std::vector<Line> lines;
+      for (std::string line; std::getline(text, line) && lines.size() + 1 < size.lines;) {
+        lines.push_back({{std::move(line), lines.empty() ? Tint::Strong : Tint::Plain}});
+      }
+      lines.resize(size.lines > 0 ? size.lines - 1 : 0);
+      lines.push_back({{"q quit", Tint::Faint}});
+      screen.draw(lines);
+      const KeyPress key = screen.wait(std::max<Duration>(next - runtime::monotonic_now(), 0));
+      if (key.key == Key::Closed || key.key == Key::Escape || (key.key == Key::Text && key.text == 'q')) return kExitOk;
+    }
+  }
+  return kExitOk;
+}
 
 }  // namespace redag::cli

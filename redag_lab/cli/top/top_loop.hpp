@@ -25,5 +25,7 @@ struct TopOptions {
 
 /// Returns the exit status.
 [[nodiscard]] int run_top(const TopOptions &options);
+/// The tasks of all executors in one table, until the user quits. Returns the exit status.
+[[nodiscard]] int watch_machine(const TopOptions &options);
 
 }  // namespace redag::cli

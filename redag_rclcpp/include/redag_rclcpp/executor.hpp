@@ -75,6 +75,9 @@ struct ReDAGOptions {
   /// itself"). deadlocks() returns them.
   bool deadlocks = true;
   std::size_t trace_capacity = 0;  // events that the rings hold between two drain_trace(); 0: no events
+  /// os, rate_monotonic or deadline_monotonic: shares one order with the other executors of this user that do so, also
+  /// in other processes. The variable REDAG_SHARE_ORDER overrides it.
+  bool share_order = false;
   bool live = false;  // shows the executor in `redag top`: a page of shared memory, and a thread that updates it
   /// Called on the thread that executed the callback; must not throw. Empty: Stop.
   std::function<OnException(const ExceptionInfo &)> on_exception{};
