@@ -1,10 +1,11 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Jobs through the scheduler alone and through the engine, for tools/count_instructions to count the instructions. The
-// engine has one worker. While a graph runs, no other thread has anything to do.
+// Jobs through the scheduler alone, through the engine and through the simulator, for tools/count_instructions to count
+// the instructions. The engine has one worker. While a graph runs, no other thread has anything to do.
 #include <cstdint>
 #include <cstdio>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "counted.hpp"
 #include "redag/base/check.hpp"
 #include "redag/runtime/setup.hpp"
+#include "redag_analysis/sim/simulator.hpp"
 #include "virtual_time.hpp"
 
 namespace {
@@ -72,6 +74,21 @@ std::uint64_t engine_waits(std::uint64_t least, PreemptionMode mode) {
   return least;
 }
 
+// With `events`, somebody reads them.
+std::uint64_t simulated_tasks(std::uint64_t least, std::size_t tasks, bool events) {
+  constexpr std::uint32_t kProcessors = 4;
+  const Workload workload = make_workload(tasks, kProcessors, 0);
+  double jobs_per_nanosecond = 0;
+  for (const TaskRef &ref : flatten(workload)) jobs_per_nanosecond += 1 / static_cast<double>(ref.task->period);
+  sim::Options options;
+  // One more second for jobs that are unfinished at the horizon.
+  options.horizon = static_cast<Duration>(static_cast<double>(least) / jobs_per_nanosecond) + kSecond;
+  sim::EventSink sink;
+  if (events) sink = [](std::span<const JobEvent>) { return true; };
+  sched::PriorityScheduler scheduler(workload, sched::config_of(workload));
+  return sim::simulate(workload, scheduler, kProcessors, options, sink).finished;
+}
+
 std::vector<Case> all_cases() {
   std::vector<Case> cases;
   const auto add = [&](const std::string &name, auto run) { cases.push_back({name, run}); };
@@ -95,6 +112,11 @@ std::vector<Case> all_cases() {
     }
     add("engine/" + std::string(to_string(mode)) + "/wait",
         [=](std::uint64_t least) { return engine_waits(least, mode); });
+  }
+  for (const std::size_t tasks : {20U, 1'000U}) {
+    const std::string name = "simulator/" + std::to_string(tasks) + "_tasks";
+    add(name, [=](std::uint64_t least) { return simulated_tasks(least, tasks, false); });
+    add(name + "_events", [=](std::uint64_t least) { return simulated_tasks(least, tasks, true); });
   }
   return cases;
 }

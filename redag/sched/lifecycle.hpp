@@ -119,7 +119,7 @@ class Lifecycle final : public Scheduler {
   void find_heirs();
 
   // From release to readiness.
-  inline void admit(TaskId id, Time nominal, Time origin);
+  [[gnu::always_inline]] inline void admit(TaskId id, Time nominal, Time origin);
   void admit_or_refuse(TaskId id, Time nominal, Time origin);
   void refuse(TaskId id, Time nominal, Reason reason);
   static std::uint32_t count_release(TaskState &task);

@@ -27,7 +27,7 @@ PriorityDispatcher::PriorityDispatcher(JobTable &table)
 
 // ---- decisions ----
 
-inline void PriorityDispatcher::decide(std::uint32_t most) {
+[[gnu::always_inline]] inline void PriorityDispatcher::decide(std::uint32_t most) {
   while (may_place()) {
     const std::uint32_t best = top();
     if (best == kNil) break;
@@ -37,8 +37,8 @@ inline void PriorityDispatcher::decide(std::uint32_t most) {
       if (!set_aside(best)) break;
       continue;
     }
-    Place place;
-    if (!find_place(job, place)) break;
+    const Place place = find_place(job);
+    if (!place.worker.valid()) break;
     if (!starts) {
       resume(best, job, place);
       continue;
@@ -51,6 +51,8 @@ inline void PriorityDispatcher::decide(std::uint32_t most) {
   if (held_back_ != kNil) put_back();
   if (devices_.has_news()) devices_.serve();
 }
+
+[[gnu::noinline]] void PriorityDispatcher::decide_rest(std::uint32_t most) { decide(most); }
 
 // The new job holds the gates that both tasks share in the place of the ended one, for which no job waits. A free
 // worker that comes before the ended job's own would be the first choice.
@@ -78,7 +80,7 @@ inline void PriorityDispatcher::decide(std::uint32_t most) {
       table_.count_ready(task, slot);
       on_end(ended);
       push(slot);
-      return decide(most);
+      return decide_rest(most);
     }
   }
   const WorkerId worker = table_.jobs[ended].worker;
@@ -90,7 +92,7 @@ inline void PriorityDispatcher::decide(std::uint32_t most) {
   workers_[worker.value].running = slot;
   workers_[worker.value].stack = slot;
   if (least_urgent_ != kNil) note_replaced(ended, slot);
-  if (top_slot != kNil) decide(most - 1);
+  if (top_slot != kNil) decide_rest(most - 1);
 }
 
 // No more jobs may start. Holds this job back and lets dispatch() look past it for started jobs, as long as there are
@@ -112,18 +114,16 @@ inline void PriorityDispatcher::decide(std::uint32_t most) {
   }
 }
 
-// Finds where `job`, the first in the ready queue, could run now. Returns false if there is no place.
-inline bool PriorityDispatcher::find_place(const Job &job, Place &place) {
+// Finds where `job`, the first in the ready queue, could run now.
+inline PriorityDispatcher::Place PriorityDispatcher::find_place(const Job &job) {
   if (!free_workers_.empty()) {
     const bool last_is_free = job.worker.valid() && workers_[job.worker.value].stack == kNil;
-    place = Place{last_is_free ? job.worker : WorkerId(free_workers_.first()), kNil};
-    return true;
+    return Place{last_is_free ? job.worker : WorkerId(free_workers_.first()), kNil};
   }
-  if (table_.config.preemption == Preemption::None) return false;
+  if (table_.config.preemption == Preemption::None) return Place{};
   const std::uint32_t victim = least_urgent_running();
-  if (victim == kNil || !outranks(job, table_.jobs[victim])) return false;
-  place = Place{table_.jobs[victim].worker, victim};
-  return true;
+  if (victim == kNil || !outranks(job, table_.jobs[victim])) return Place{};
+  return Place{table_.jobs[victim].worker, victim};
 }
 
 // Returns the job that would lose its worker first: of all running jobs (Full), or of those on top of an open worker
@@ -158,7 +158,7 @@ inline bool PriorityDispatcher::outranks(const Job &a, const Job &b) const {
   return level_of_key_.empty() ? std::min(key, table_.tier_count()) : level_of_key_[key];
 }
 
-[[gnu::always_inline]] inline void PriorityDispatcher::start(std::uint32_t slot, Job &job, const Place &place) {
+[[gnu::always_inline]] inline void PriorityDispatcher::start(std::uint32_t slot, Job &job, Place place) {
   remove_unstarted(slot);
   hold_gates(slot, job);
   ++started_;
@@ -168,7 +168,7 @@ inline bool PriorityDispatcher::outranks(const Job &a, const Job &b) const {
   occupy(place.worker, slot);
 }
 
-[[gnu::noinline]] void PriorityDispatcher::resume(std::uint32_t slot, Job &job, const Place &place) {
+[[gnu::noinline]] void PriorityDispatcher::resume(std::uint32_t slot, Job &job, Place place) {
   remove(slot);
   make_way(place);
   job.under = table_.config.preemption == Preemption::Cooperative ? place.victim : kNil;
@@ -190,7 +190,7 @@ inline bool PriorityDispatcher::outranks(const Job &a, const Job &b) const {
   note_running(slot);
 }
 
-inline void PriorityDispatcher::make_way(const Place &place) {
+inline void PriorityDispatcher::make_way(Place place) {
   if (place.victim == kNil) {
     free_workers_.clear(place.worker.value);
     return;

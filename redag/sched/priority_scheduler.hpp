@@ -34,7 +34,7 @@ class PriorityDispatcher {
   void on_wake(std::uint32_t slot);
   void on_reconfigured();
   void on_preemption_point(std::uint32_t slot) { open(table_.jobs[slot].worker.value); }
-  void decide(std::uint32_t most);
+  [[gnu::always_inline]] inline void decide(std::uint32_t most);
   [[nodiscard]] bool share_gates(TaskId a, TaskId b) const {
     return task_gates_[a.value].shares_all_with(task_gates_[b.value]);
   }
@@ -76,7 +76,7 @@ class PriorityDispatcher {
     bool open = false;  // Cooperative: a nested job ended or a preemption point was reached, and a decision is due
   };
   struct Place {
-    WorkerId worker;
+    WorkerId worker;              // invalid: there is no place
     std::uint32_t victim = kNil;  // the job that loses the worker
   };
 
@@ -84,18 +84,19 @@ class PriorityDispatcher {
   [[nodiscard]] bool may_place() const {
     return table_.config.preemption != Preemption::None || !free_workers_.empty();
   }
-  [[nodiscard]] bool find_place(const Job &job, Place &place);
+  [[nodiscard]] Place find_place(const Job &job);
   [[nodiscard]] std::uint32_t least_urgent_running();
   void forget_least_urgent() { least_urgent_ = kNil; }
   [[nodiscard]] bool outranks(const Job &a, const Job &b) const;
   [[nodiscard]] std::uint32_t level_of(const Job &job) const;
   void tell_level(std::uint32_t slot, std::uint32_t old_level);
-  void start(std::uint32_t slot, Job &job, const Place &place);
-  void resume(std::uint32_t slot, Job &job, const Place &place);
+  void decide_rest(std::uint32_t most);
+  void start(std::uint32_t slot, Job &job, Place place);
+  void resume(std::uint32_t slot, Job &job, Place place);
   void occupy(WorkerId worker, std::uint32_t slot);
   void note_running(std::uint32_t slot);
   void note_replaced(std::uint32_t ended, std::uint32_t slot);
-  void make_way(const Place &place);
+  void make_way(Place place);
   void leave_worker(const Job &job);
   void leave_queue(std::uint32_t slot);
   [[nodiscard]] bool is_in_ready_queue(const Job &job) const;

@@ -38,22 +38,23 @@ class Simulation {
       if (task.activation != Activation::Timer || task.offset >= options.horizon) continue;
       TimerRelease &release = tasks_.back().release;
       release = {.seen = task.offset + jitter(task, ref.id, 0), .nominal = task.offset, .task = ref.id};
-      releases_.set(ref.id, release.seen);
+      expect(release);
     }
   }
 
   Result run() {
     if (!sink_) scheduler_.record_only({});
+    has_points_ = has_regions_ || has_limits_;
     bool goes_on = true;
     while (goes_on) {
-      const Time of_jobs = has_waits_ ? std::min(next_processor_event(), next_wait_event()) : next_processor_event();
-      const Time next = std::min(releases_.next(), of_jobs);
-      if (next > options_.horizon || (next == options_.horizon && of_jobs > next)) break;
+      Time next = std::min(releases_.next(), first_end_);
+      if (has_points_ || has_waits_) next = std::min(next, next_rare_event());
+      if (next > options_.horizon) break;
       now_ = next;
-      if (of_jobs == now_) complete_jobs();
+      if (first_end_ == now_) complete_jobs();
       if (has_limits_) reach_limits();
       if (has_waits_) {
-        begin_waits();
+        if (first_end_ == now_) begin_waits();
         end_waits();
       }
       release_jobs();
@@ -70,14 +71,12 @@ class Simulation {
     Duration left = 0;      // processor time until it ends or waits, overheads included
     Duration executed = 0;  // up to its last loss of the processor
     Duration lead = 0;      // overheads; they come before the body and hold no preemption point
-    Duration region = 0;
-    std::uint32_t place = 0;    // of its task in the static order
-    std::uint32_t number = 0;   // within its task
+    TaskId task;
+    std::uint32_t number = 0;  // within its task
+    std::uint32_t next_wait = 0;
     bool cut_off = false;       // it ends at its budget
     bool ends_in_wait = false;  // it waits once `left` is used up, and does not end
-    std::uint32_t next_wait = 0;
-    TaskId task;          // of a task with waits
-    Duration demand = 0;  // of the body; of a task with waits
+    Duration demand = 0;        // of the body; of a task with waits
     Duration wait = 0;    // length of the wait that it began last
     // Processor time of the body that uses these up; kNever: not watched, or already reported.
     Duration budget = kNever;
@@ -86,18 +85,19 @@ class Simulation {
   // What the simulation needs of a task, together in memory.
   struct TaskState {
     const Task *task = nullptr;
-    Duration period = 0;
-    TimerRelease release;  // its next one
+    std::uint32_t place = 0;  // in the static order
     bool has_jitter = false;
     bool demand_varies = true;  // if not, each of its jobs begins as `fresh`
+    Duration period = 0;
+    TimerRelease release;  // its next one
     Progress fresh;
   };
   struct Processor {
     JobSlot job;
-    Time since = 0;        // when the job last got the processor
-    Time finish = kNever;  // if nothing intervenes
-    Time wait = kNever;    // the same, when the job next leaves the processor to wait
-    Time point = kNever;   // the next preemption point that matters, or the next limit
+    bool ends_in_wait = false;  // as its job
+    Time since = 0;             // when the job last got the processor
+    Time end = kNever;          // when the job ends or begins to wait if nothing intervenes
+    Time point = kNever;        // the next preemption point that matters, or the next limit
   };
 
   // A job without a processor, which a device serves or which waits without one.
@@ -106,18 +106,16 @@ class Simulation {
     Time until = 0;
   };
 
-  [[nodiscard]] Time next_processor_event() const {
-    Time next = kNever;
-    for (const Processor &processor : processors_) next = std::min(next, processor.finish);
-    if (has_regions_ || has_limits_) {
-      for (const Processor &processor : processors_) next = std::min(next, processor.point);
-    }
-    return next;
+  [[nodiscard]] Time first_end() const {
+    Time first = kNever;
+    for (const Processor &processor : processors_) first = std::min(first, processor.end);
+    return first;
   }
 
-  [[nodiscard]] Time next_wait_event() const {
+  // Returns when the next preemption point, the next limit, or the end of the next wait is.
+  [[nodiscard]] Time next_rare_event() const {
     Time next = kNever;
-    for (const Processor &processor : processors_) next = std::min(next, processor.wait);
+    for (const Processor &processor : processors_) next = std::min(next, processor.point);
     for (const Away &away : away_) next = std::min(next, away.until);
     return next;
   }
@@ -152,11 +150,19 @@ class Simulation {
   [[nodiscard]] bool comes_first(JobSlot a, JobSlot b) const {
     const Progress &x = progress_[a.value];
     const Progress &y = progress_[b.value];
-    return x.place != y.place ? x.place < y.place : x.number < y.number;
+    return x.task != y.task ? tasks_[x.task.value].place < tasks_[y.task.value].place : x.number < y.number;
+  }
+
+  // Returns true if the job there ends now, or begins to wait now. If not, its end counts for first_end_.
+  [[nodiscard]] bool is_due(const Processor &processor, bool in_wait) {
+    const bool due = processor.end == now_ && processor.ends_in_wait == in_wait;
+    first_end_ = std::min(first_end_, due ? kNever : processor.end);
+    return due;
   }
 
   void complete_jobs() {
-    tell_in_order([this](const Processor &processor) { return processor.finish <= now_; },
+    first_end_ = kNever;
+    tell_in_order([this](const Processor &processor) { return is_due(processor, false); },
                   [this](Processor &processor) {
                     const JobSlot job = processor.job;
                     const bool cut_off = progress_[job.value].cut_off;
@@ -167,7 +173,8 @@ class Simulation {
   }
 
   void begin_waits() {
-    tell_in_order([this](const Processor &processor) { return processor.wait <= now_; },
+    first_end_ = kNever;
+    tell_in_order([this](const Processor &processor) { return is_due(processor, true); },
                   [this](Processor &processor) {
                     const JobSlot job = processor.job;
                     Progress &progress = progress_[job.value];
@@ -198,7 +205,7 @@ class Simulation {
   }
 
   void release_jobs() {
-    while (releases_.next() <= now_ && now_ < options_.horizon) {
+    while (releases_.next() <= now_) {
       TaskState &state = tasks_[releases_.task().value];
       TimerRelease &release = state.release;
       ++result_.released;
@@ -206,8 +213,12 @@ class Simulation {
       const std::uint32_t next = release.number + 1;
       const Duration gap = options_.gap ? options_.gap(*state.task, release.task, next) : 0;
       release.advance(state.period + gap, state.has_jitter ? jitter(*state.task, release.task, next) : 0);
-      releases_.set(release.task, release.seen);
+      expect(release);
     }
+  }
+
+  void expect(const TimerRelease &release) {
+    releases_.set(release.task, release.seen < options_.horizon ? release.seen : kNever);
   }
 
   // Processor time of the body up to now; negative during the overheads before it.
@@ -237,13 +248,17 @@ class Simulation {
     });
   }
 
+  [[nodiscard]] Duration region_of(const Processor &processor) const {
+    return tasks_[progress_[processor.job.value].task.value].task->region;
+  }
+
   // Reports jobs at a multiple of their region, if another job outranks them.
   void reach_preemption_points() {
     for (Processor &processor : processors_) {
       if (!processor.job.valid() || !scheduler_.outranked(processor.job)) continue;
-      const Progress &progress = progress_[processor.job.value];
+      const Duration region = region_of(processor);
       const Duration body = body_of(processor);
-      if (progress.region > 0 && body > 0 && body % progress.region == 0) {
+      if (region > 0 && body > 0 && body % region == 0) {
         scheduler_.preemption_point(processor.job, now_);
       }
     }
@@ -251,52 +266,53 @@ class Simulation {
 
   bool carry_out(const sched::Step &step) {
     for (const sched::Dispatch &dispatch : step.dispatches) {
-      if (dispatch.over.valid()) take_processor(dispatch.over);
-      give_processor(dispatch);
+      switch (dispatch.kind) {
+        case sched::DispatchKind::Start:
+        case sched::DispatchKind::Resume: give_processor(dispatch); break;
+        case sched::DispatchKind::Level: break;  // other dispatches tell which jobs run
+        case sched::DispatchKind::Serve: go_away(dispatch.job); break;
+      }
     }
-    if (has_regions_ || has_limits_) plan_points();
+    if (has_points_) plan_points();
     return !sink_ || sink_(step.events);
   }
 
-  void take_processor(JobSlot job) {
-    for (Processor &processor : processors_) {
-      if (processor.job != job) continue;
-      Progress &progress = progress_[job.value];
-      progress.executed += now_ - processor.since;
-      progress.left = std::min(processor.finish, processor.wait) - now_;
-      processor = Processor{};
-    }
+  void take_processor(Processor &processor) {
+    Progress &progress = progress_[processor.job.value];
+    progress.executed += now_ - processor.since;
+    progress.left = processor.end - now_;
+    processor = Processor{};
+    first_end_ = first_end();
   }
 
   void give_processor(const sched::Dispatch &dispatch) {
-    if (dispatch.kind == sched::DispatchKind::Level) return;  // other dispatches tell which jobs run
-    if (dispatch.kind == sched::DispatchKind::Serve) return go_away(dispatch.job);
     Processor &processor = processors_[dispatch.worker.value];
+    // A job that is suspended under another may have lost its processor before.
+    if (dispatch.over.valid() && processor.job == dispatch.over) take_processor(processor);
     REDAG_CHECK(!processor.job.valid(), "the scheduler gave a processor to two jobs");
-    if (dispatch.job.value >= progress_.size()) progress_.resize(dispatch.job.value + 1);
+    if (dispatch.kind == sched::DispatchKind::Start) begin_job(dispatch);
     Progress &progress = progress_[dispatch.job.value];
     if (dispatch.kind == sched::DispatchKind::Resume) {
       progress.left += options_.overheads.preempt;
       progress.lead += options_.overheads.preempt;
-    } else {
-      progress = begin_job(dispatch);
     }
     processor.job = dispatch.job;
+    processor.ends_in_wait = progress.ends_in_wait;
     processor.since = now_;
-    (progress.ends_in_wait ? processor.wait : processor.finish) = now_ + progress.left;
+    processor.end = now_ + progress.left;
+    first_end_ = std::min(first_end_, processor.end);
   }
 
   [[nodiscard]] TaskState task_state(const Task &task, TaskId id, std::uint32_t place) const {
     TaskState state;
     state.task = &task;
+    state.place = place;
     state.period = task.period;
     state.has_jitter = task.jitter > 0 || options_.jitter;
     state.demand_varies = task.execution.kind != ExecutionTime::Kind::Constant || options_.demand || task.wcet <= 0;
-    state.fresh.place = place;
     if (task.on_budget != OnBudget::Abort && task.budget > 0) state.fresh.budget = task.budget;
     if (task.wcet_low > 0) state.fresh.wcet_low = task.wcet_low;
     state.fresh.lead = options_.overheads.release + options_.overheads.dispatch;
-    state.fresh.region = task.region;
     state.fresh.task = id;
     set_demand(state.fresh, task, task.wcet);
     return state;
@@ -321,17 +337,18 @@ class Simulation {
     progress.left += progress.lead;
   }
 
-  [[nodiscard]] Progress begin_job(const sched::Dispatch &dispatch) const {
+  void begin_job(const sched::Dispatch &dispatch) {
+    if (dispatch.job.value >= progress_.size()) progress_.resize(dispatch.job.value + 1);
+    Progress &progress = progress_[dispatch.job.value];
     const TaskState &state = tasks_[dispatch.task.value];
-    Progress progress = state.fresh;
+    progress = state.fresh;
     progress.number = dispatch.number;
-    if (!state.demand_varies) return progress;
+    if (!state.demand_varies) return;
     const Task &task = *state.task;
     const Duration demand = options_.demand ? options_.demand(task, dispatch.task, dispatch.number)
                                             : execution_time(task, dispatch.task, dispatch.number, options_.seed);
     REDAG_CHECK(demand > 0, "a job executes for a positive time");
     set_demand(progress, task, demand);
-    return progress;
   }
 
   // Only a job that another one outranks needs an event at its preemption point.
@@ -340,14 +357,15 @@ class Simulation {
       processor.point = kNever;
       if (!processor.job.valid()) continue;
       const Progress &progress = progress_[processor.job.value];
+      const Duration region = region_of(processor);
       const Duration body = body_of(processor);
       Duration next_body = std::min(progress.budget, progress.wcet_low);
-      if (progress.region > 0 && scheduler_.outranked(processor.job)) {
-        next_body = std::min(next_body, body < 0 ? progress.region : (body / progress.region + 1) * progress.region);
+      if (region > 0 && scheduler_.outranked(processor.job)) {
+        next_body = std::min(next_body, body < 0 ? region : (body / region + 1) * region);
       }
       if (next_body == kNever) continue;
       const Time point = now_ + (next_body - body);
-      if (point < processor.finish) processor.point = point;
+      if (point < processor.end) processor.point = point;
     }
   }
 
@@ -366,8 +384,10 @@ class Simulation {
   ReleaseTree releases_;
   Result result_;
   Time now_ = 0;
+  Time first_end_ = kNever;  // the earliest Processor::end
   bool has_regions_ = false;
   bool has_limits_ = false;
+  bool has_points_ = false;  // one of these two
   bool has_waits_ = false;
 };
 
