@@ -77,7 +77,7 @@ class Simulation {
     bool cut_off = false;       // it ends at its budget
     bool ends_in_wait = false;  // it waits once `left` is used up, and does not end
     Duration demand = 0;        // of the body; of a task with waits
-    Duration wait = 0;    // length of the wait that it began last
+    Duration wait = 0;          // length of the wait that it began last
     // Processor time of the body that uses these up; kNever: not watched, or already reported.
     Duration budget = kNever;
     Duration wcet_low = kNever;
