@@ -3,6 +3,7 @@
 
 // Subscriptions as callbacks: takes a message from the middleware, or from the buffer of its own process, and calls the
 // user's function.
+#include <rcl/error_handling.h>
 #include <rcl/subscription.h>
 
 #include <stdexcept>
@@ -11,15 +12,48 @@
 #include "arrival_callback.hpp"
 #include "compat.hpp"
 #include "entities.hpp"
-#include "rclcpp/executor.hpp"
+#include "rclcpp/subscription_base.hpp"
 #include "take.hpp"
 
 namespace redag_rclcpp {
 namespace {
 
-// Opens rclcpp's own way of executing a subscription, for the cases that need no other.
-struct Rclcpp : rclcpp::Executor {
-  using rclcpp::Executor::execute_subscription;
+// Opens what rclcpp asks before it handles a message: whether intra-process communication delivers it as well.
+struct Rclcpp : rclcpp::SubscriptionBase {
+  using rclcpp::SubscriptionBase::matches_any_intra_process_publishers;
+};
+
+/// A message that stays in the middleware's memory, for instance shared memory, while the user's function reads it.
+class Loan {
+ public:
+  explicit Loan(rclcpp::SubscriptionBase &subscription) : subscription_(subscription) {}
+  ~Loan() {
+    if (message_ == nullptr) return;
+    if (rcl_return_loaned_message_from_subscription(subscription_.get_subscription_handle().get(), message_) ==
+        RCL_RET_OK) {
+      return;
+    }
+    RCLCPP_ERROR(rclcpp::get_logger("redag_rclcpp"), "cannot give back a loaned message of topic '%s': %s",
+                 subscription_.get_topic_name(), rcl_get_error_string().str);
+    rcl_reset_error();
+  }
+  Loan(const Loan &) = delete;
+  Loan &operator=(const Loan &) = delete;
+
+  /// False: there is none, or intra-process communication delivers it.
+  [[nodiscard]] bool take(rclcpp::MessageInfo &info) {
+    rmw_message_info_t &rmw = info.get_rmw_message_info();
+    const rcl_ret_t result =
+        rcl_take_loaned_message(subscription_.get_subscription_handle().get(), &message_, &rmw, nullptr);
+    if (result == RCL_RET_SUBSCRIPTION_TAKE_FAILED) return false;
+    check_rcl(result, "cannot take a loaned message");
+    return !(subscription_.*(&Rclcpp::matches_any_intra_process_publishers))(&rmw.publisher_gid);
+  }
+  [[nodiscard]] void *message() const { return message_; }
+
+ private:
+  rclcpp::SubscriptionBase &subscription_;
+  void *message_ = nullptr;
 };
 
 std::size_t depth_of(const rclcpp::QoS &qos) {
@@ -77,6 +111,7 @@ class SubscriptionCallback final : public ArrivalCallback {
   }
   [[nodiscard]] bool handle(const Token &token, Taking &taking) override;
   [[nodiscard]] bool handle_intra_process(const Token &token);
+  [[nodiscard]] bool handle_from_middleware(rclcpp::SubscriptionBase &subscription, Taking &taking);
   // Later messages replace earlier ones.
   [[nodiscard]] bool drops_skipped() const override { return alive(); }
   void drop_skipped(Source source) override;
@@ -138,21 +173,33 @@ bool SubscriptionCallback::handle(const Token &token, Taking &taking) {
   }
   TRACETOOLS_TRACEPOINT(rclcpp_executor_execute,
                         static_cast<const void *>(subscription->get_subscription_handle().get()));
-  if (subscription->is_serialized() || subscription->can_loan_messages()) {
-    taking.begin();
-    Rclcpp::execute_subscription(subscription);
-    return true;
-  }
+  const bool taken = handle_from_middleware(*subscription, taking);
+  if (has_intra_process_) taking.count(taken);
+  return taken;
+}
+
+bool SubscriptionCallback::handle_from_middleware(rclcpp::SubscriptionBase &subscription, Taking &taking) {
   rclcpp::MessageInfo info;
   info.get_rmw_message_info().from_intra_process = false;
-  std::shared_ptr<void> message = subscription->create_message();
-  taking.begin();
-  const bool taken = take_and_handle(
-      "a message of topic", subscription->get_topic_name(),
-      [&] { return subscription->take_type_erased(message.get(), info); },
-      [&] { subscription->handle_message(message, info); });
-  if (has_intra_process_) taking.count(taken);
-  subscription->return_message(message);
+  const auto begin = [&](auto take, auto handle) {
+    taking.begin();
+    return take_and_handle("a message of topic", subscription.get_topic_name(), take, handle);
+  };
+  if (subscription.is_serialized()) {
+    std::shared_ptr<rclcpp::SerializedMessage> message = subscription.create_serialized_message();
+    const bool taken = begin([&] { return subscription.take_serialized(*message, info); },
+                             [&] { subscription.handle_serialized_message(message, info); });
+    subscription.return_serialized_message(message);
+    return taken;
+  }
+  if (subscription.can_loan_messages()) {
+    Loan loan(subscription);
+    return begin([&] { return loan.take(info); }, [&] { subscription.handle_loaned_message(loan.message(), info); });
+  }
+  std::shared_ptr<void> message = subscription.create_message();
+  const bool taken = begin([&] { return subscription.take_type_erased(message.get(), info); },
+                           [&] { subscription.handle_message(message, info); });
+  subscription.return_message(message);
   return taken;
 }
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Conformance: subscriptions, services, actions, parameters, waitables and QoS events.
+// Conformance: services, actions, parameters, waitables and QoS events. conformance_messages_test.cpp has messages.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,7 +11,6 @@
 #include <functional>
 #include <future>
 #include <memory>
-#include <mutex>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -27,7 +26,6 @@
 #include "spinning.hpp"
 #include "test_msgs/action/fibonacci.hpp"
 #include "test_msgs/msg/empty.hpp"
-#include "test_msgs/msg/strings.hpp"
 #include "test_msgs/srv/empty.hpp"
 
 namespace redag_rclcpp {
@@ -35,84 +33,8 @@ namespace {
 
 using namespace std::chrono_literals;
 using test_msgs::msg::Empty;
-using test_msgs::msg::Strings;
 using ::testing::HasSubstr;
 using ::testing::Not;
-
-TYPED_TEST(Conformance, EveryMessageArrivesInOrder) {
-  for (const bool intra_process : {false, true}) {
-    SCOPED_TRACE(intra_process ? "intra-process" : "through the middleware");
-    auto other = std::make_shared<rclcpp::Node>("other", rclcpp::NodeOptions().use_intra_process_comms(intra_process));
-    std::mutex mutex;
-    std::vector<std::string> received;
-    const rclcpp::QoS qos = rclcpp::QoS(1000).reliable();
-    auto subscription = other->create_subscription<Strings>("strings", qos, [&](Strings::ConstSharedPtr message) {
-      const std::lock_guard guard(mutex);
-      received.push_back(message->string_value);
-    });
-    auto publisher = other->create_publisher<Strings>("strings", qos);
-    this->executor->add_node(other);
-    {
-      Spinner spinner(*this->executor);
-      ASSERT_TRUE(eventually([&] { return intra_process || publisher->get_subscription_count() > 0; }));
-      std::vector<std::string> sent;
-      for (int i = 0; i < 300; ++i) {
-        auto message = std::make_unique<Strings>();
-        message->string_value = std::to_string(i);
-        sent.push_back(message->string_value);
-        publisher->publish(std::move(message));
-      }
-      EXPECT_TRUE(eventually([&] {
-        const std::lock_guard guard(mutex);
-        return received.size() >= sent.size();
-      }));
-      spinner.stop();
-      EXPECT_EQ(received, sent);
-    }
-    this->executor->remove_node(other);
-  }
-}
-
-TYPED_TEST(Conformance, OverwrittenMessagesAreNotWaitedFor) {
-  std::atomic<int> last{-1};
-  std::atomic<int> count{0};
-  auto subscription = this->node->template create_subscription<Strings>("strings", rclcpp::QoS(2),
-                                                                        [&](Strings::ConstSharedPtr message) {
-                                                                          ++count;
-                                                                          last = std::stoi(message->string_value);
-                                                                        });
-  auto publisher = this->node->template create_publisher<Strings>("strings", rclcpp::QoS(2));
-  this->executor->add_node(this->node);
-  ASSERT_TRUE(eventually([&] { return publisher->get_subscription_count() > 0; }));
-  this->executor->spin_some();
-  Strings message;
-  for (int i = 0; i < 50; ++i) {
-    message.string_value = std::to_string(i);
-    publisher->publish(message);
-  }
-  std::this_thread::sleep_for(50ms);
-  Spinner spinner(*this->executor);
-  EXPECT_TRUE(eventually([&] { return last == 49; }));
-  std::this_thread::sleep_for(20ms);
-  EXPECT_LE(count, 2);
-  // Later messages still arrive.
-  message.string_value = "100";
-  publisher->publish(message);
-  EXPECT_TRUE(eventually([&] { return last == 100; }));
-}
-
-TYPED_TEST(Conformance, SerializedMessages) {
-  std::atomic<std::size_t> bytes{0};
-  auto subscription = this->node->create_generic_subscription(
-      "strings", "test_msgs/msg/Strings", rclcpp::QoS(10),
-      [&](std::shared_ptr<rclcpp::SerializedMessage> message) { bytes = message->size(); });
-  auto publisher = this->node->template create_publisher<Strings>("strings", rclcpp::QoS(10));
-  this->executor->add_node(this->node);
-  Spinner spinner(*this->executor);
-  ASSERT_TRUE(eventually([&] { return publisher->get_subscription_count() > 0; }));
-  publisher->publish(Strings());
-  EXPECT_TRUE(eventually([&] { return bytes > 0; }));
-}
 
 TYPED_TEST(Conformance, ServiceAndClientOnOneExecutor) {
   auto service = this->node->template create_service<test_msgs::srv::Empty>(
