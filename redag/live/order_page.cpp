@@ -23,7 +23,7 @@ namespace {
 
 constexpr std::string_view kTitle = "redag-order 1\n";
 constexpr std::string_view kEnd = "end\n";
-constexpr std::string_view kPrefix = "redag-order.";
+constexpr std::string_view kOrderPrefix = "redag-order.";
 constexpr std::string_view kUnfinished = ".new";  // behind the name of a page that is being written
 constexpr std::size_t kLongestText = 64 * 1024;
 constexpr unsigned kMostExecutors = 1000;  // of one process
@@ -41,7 +41,7 @@ bool take(std::string_view &text, std::string_view prefix, char end, Number &num
 }
 
 std::string path_of(const std::string &folder, const OrderPageName &name) {
-  return fmt::format("{}/{}{}.{}.{}.{}", folder, kPrefix, name.process.pid, name.process.start,
+  return fmt::format("{}/{}{}.{}.{}.{}", folder, kOrderPrefix, name.process.pid, name.process.start,
                      name.process.pid_namespace, name.number);
 }
 
@@ -57,7 +57,7 @@ std::optional<NamedFile> parse_name(std::string_view text) {
     text.remove_suffix(kUnfinished.size());
   }
   Process &process = file.name.process;
-  if (!take(text, kPrefix, '.', process.pid) || !take(text, "", '.', process.start) ||
+  if (!take(text, kOrderPrefix, '.', process.pid) || !take(text, "", '.', process.start) ||
       !take(text, "", '.', process.pid_namespace)) {
     return std::nullopt;
   }

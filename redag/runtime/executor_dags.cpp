@@ -41,8 +41,9 @@ void state_wcet(Task &task, Duration longest) {
 void state_waits(Task &task, std::uint32_t most, Duration longest) {
   const auto count = std::min<Duration>({most, Duration{kMaxWaits}, task.wcet - 1});
   for (Duration wait = 0; wait < count; ++wait) {
-    task.waits.push_back({.after = (wait + 1) * task.wcet / (count + 1),
-                          .longest = std::max<Duration>(1, (longest + count - 1) / count)});
+    Wait &one = task.waits.emplace_back();
+    one.after = (wait + 1) * task.wcet / (count + 1);
+    one.longest = std::max<Duration>(1, (longest + count - 1) / count);
   }
 }
 
