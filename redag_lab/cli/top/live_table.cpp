@@ -10,6 +10,7 @@
 
 #include "redag/base/text.hpp"
 #include "redag_analysis/text/table.hpp"
+#include "redag_lab/cli/top/live_cells.hpp"
 
 namespace redag::cli {
 namespace {
@@ -69,21 +70,6 @@ constexpr std::size_t kCount = std::size(kColumns);
 
 bool is_graph(std::size_t column) { return kColumns[column].field >= Field::Histogram; }
 
-std::string rate_text(double rate) {
-  if (rate <= 0) return "-";
-  if (rate < 10) return fmt::format("{:.2f}", rate);
-  return fmt::format("{:.{}f}", rate, rate < 1000 ? 1 : 0);
-}
-
-Cell time_cell(Duration time, Tint tint = Tint::Plain) {
-  if (time <= 0) return {"-", Tint::Faint};
-  return {humanize_duration(time), tint};
-}
-
-Cell count_cell(std::uint64_t count, Tint tint = Tint::Plain) {
-  return {format_count(count), count > 0 ? tint : Tint::Faint};
-}
-
 /// What a row shows, of a DAG or of a task.
 struct Shown {
   const Figures &figures;
@@ -110,13 +96,6 @@ Cell name_cell(const LiveRow &row, const Frame &frame, const LiveView &view) {
   return {is_below_dag ? "  " + task.name : full_name(task, frame), misses_now ? Tint::Bad : Tint::Plain};
 }
 
-Cell missed_cell(const Shown &shown) {
-  const Figures &figures = shown.figures;
-  Cell cell = count_cell(figures.misses, figures.recent_misses > 0 ? Tint::Bad : Tint::Caution);
-  if (figures.recent_misses > 0) cell.text += " +" + format_count(figures.recent_misses);
-  return cell;
-}
-
 Cell cell_of(Field field, const LiveRow &row, const Frame &frame, const LiveView &view) {
   const Shown shown = shown_of(row, frame);
   const Figures &figures = shown.figures;
@@ -133,7 +112,7 @@ Cell cell_of(Field field, const LiveRow &row, const Frame &frame, const LiveView
     case Field::Longest: return response_cell(response.longest);
     case Field::Deadline: return time_cell(shown.deadline);
     case Field::Bound: return time_cell(shown.bound);
-    case Field::Missed: return missed_cell(shown);
+    case Field::Missed: return missed_cell(shown.figures);
     case Field::Active: {
       const std::string active =
           shown.cap > 0 ? fmt::format("{}/{}", figures.active, shown.cap) : fmt::format("{}", figures.active);

@@ -10,26 +10,12 @@
 
 #include "redag/base/text.hpp"
 #include "redag_analysis/text/table.hpp"
+#include "redag_lab/cli/top/live_cells.hpp"
 
 namespace redag::cli {
-namespace {
 
 using live::Frame;
 using live::TaskFrame;
-
-Cell time_cell(Duration time, Tint tint = Tint::Plain) {
-  if (time <= 0) return {"-", Tint::Faint};
-  return {humanize_duration(time), tint};
-}
-
-Cell missed_cell(const live::page::Figures &figures) {
-  if (figures.recent_misses > 0) {
-    return {fmt::format("{} +{}", format_count(figures.misses), format_count(figures.recent_misses)), Tint::Bad};
-  }
-  return {format_count(figures.misses), figures.misses > 0 ? Tint::Caution : Tint::Faint};
-}
-
-}  // namespace
 
 std::vector<MachineRow> machine_rows(const std::vector<live::Listed> &pages, const LiveView &view) {
   std::vector<MachineRow> rows;
@@ -77,7 +63,7 @@ std::string machine_text(const std::vector<live::Listed> &pages, const LiveView 
                {frame.name},
                {full_name(task, frame)},
                time_cell(task.period),
-               {fmt::format("{:.4g}", rate_of(task.figures, frame, view.since_start))},
+               {rate_text(rate_of(task.figures, frame, view.since_start))},
                response_cell(response.p50),
                response_cell(response.p99),
                response_cell(response.longest),
