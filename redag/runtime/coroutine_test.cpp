@@ -655,7 +655,7 @@ TEST_P(EveryMode, TheCheckerAcceptsARecordedRun) {
     executor.add(std::move(control));
     executor.run();
   }
-  const Result<trace::Trace> trace = trace::read_trace((folder / "events.jsonl").string());
+  const Result<trace::Trace> trace = trace::read_trace((folder / "events.redag").string());
   ASSERT_TRUE(trace.has_value()) << to_string(trace.error());
   ASSERT_EQ(trace->info.workload.platform.devices.size(), 1U);
   EXPECT_EQ(trace->info.workload.platform.devices[0].name, "gpu");
