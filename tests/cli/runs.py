@@ -219,7 +219,7 @@ class Waits(Case):
         for mode in "none", "cooperative":
             with self.subTest(mode=mode):
                 out = self.folder / mode
-                self.expect(redag("run", self.FILE, "--preemption", mode, "--duration", "1s", "--out", out, "--check"), 0)
+                self.expect(redag("run", self.FILE, "--preemption", mode, "--duration", "1s", "--out", out), 0)
                 events = redag("events", out).stdout
                 for kind in ("waits", "served", "woken"):
                     self.assertIn(kind, events)
