@@ -219,11 +219,12 @@ class SchemaTest(unittest.TestCase):
 
     def test_robots(self):
         jsonschema.Draft7Validator.check_schema(ROBOT_SCHEMA)
-        files = [ROOT / "examples" / "robot" / "cart.yaml"]
+        files = [ROOT / "examples" / "robot" / name for name in ("cart.yaml", "brake.yaml")]
         texts = [file.read_text(encoding="utf-8") for file in files]
         page = (ROOT / "docs" / "robot.md").read_text(encoding="utf-8")
-        texts += [part.split("```")[0] for part in page.split("```yaml")[1:]]
-        self.assertGreater(len(texts), 1)
+        blocks = [part.split("```")[0] for part in page.split("```yaml")[1:]]
+        texts += [block for block in blocks if block.lstrip().startswith("robot:")]
+        self.assertGreater(len(texts), len(files))
         for text in [*texts, ROBOT]:
             self.assertEqual(robot_errors(yaml.safe_load(text)), [], text)
 

@@ -93,13 +93,26 @@ class Why(Case):
         self.assertIn("no deadline was missed; the jobs that came closest", text)
         self.assertIn("met its deadline", self.expect(redag("why", folder, "planning.plan"), 0).stdout)
 
+    def test_many_parts_are_summed_up(self):
+        dags = "".join(f"  - {{name: d{i}, tasks: [{{name: t, wcet: 10us, period: 1ms}}]}}\n" for i in range(60))
+        file = self.write("many.yaml", "platform: {workers: 1, preemption: os}\ndags:\n" + dags +
+                          "  - {name: slow, tasks: [{name: t, wcet: 2ms, period: 50ms}]}\n")
+        folder = self.folder / "many"
+        self.expect(redag("simulate", file, "--duration", "100ms", "--out", folder), 0)
+        short, whole = (self.expect(redag("why", folder, "slow.t#0", *more), 0).stdout for more in ([], ["--all"]))
+        self.assertLess(len(short.splitlines()), 50)
+        self.assertIn("shorter parts, mainly ", short)
+        self.assertIn("--all shows all", short)
+        self.assertGreater(len(whole.splitlines()), 200)
+        document = json.loads(self.expect(redag("why", folder, "slow.t#0", "--json"), 0).stdout)
+        self.assertEqual(sum(part["length_ns"] for part in document["jobs"][0]["parts"]), document["jobs"][0]["length_ns"])
+
     def test_mistakes(self):
         folder = self.simulated()
         self.expect(redag("why", self.folder / "none"), 2, "no such file or folder")
         self.expect(redag("why", folder, "control.contoller"), 2, "did you mean 'control.controller'?")
         self.expect(redag("why", folder, "control.controller#9999"), 2, "its jobs are 0 to")
         self.expect(redag("why", folder, "control.controller#x"), 2, "has no job 'x'")
-        self.expect(redag("why", folder, "control.controller", "--all"), 2, "--all")
         (folder / "kernel.jsonl").write_text("nonsense\n")
         self.expect(redag("why", folder), 2, "kernel.jsonl:1", "not a kernel's record")
         (folder / "kernel.jsonl").unlink()
