@@ -181,23 +181,31 @@ std::vector<int> order_of_service(PreemptionMode mode, Device::Queue queue) {
   options.policy = PolicyKind::Fixed;
   Executor executor(options);
   const DeviceHandle gpu = executor.device("gpu");
-  std::vector<int> order;
+  std::vector<int> order;  // the device's thread alone writes it
+  std::atomic<int> served{0};
   std::atomic<bool> all_asked{false};
-  AsyncEvent turn[4];
+  AsyncEvent turn[5];
   const auto client = [&](int priority, int asks_as) {
     return once("client_" + std::to_string(priority),
                 [&, priority, asks_as]() -> Coroutine {
                   if (asks_as > 0) co_await turn[asks_as];
-                  if (asks_as < 3) turn[asks_as + 1].set();
-                  if (asks_as == 3) all_asked = true;
+                  turn[asks_as + 1].set();
                   co_await gpu.run([&] {
                     while (!all_asked) std::this_thread::sleep_for(100us);
                     order.push_back(priority);
+                    ++served;
                   });
-                  if (order.size() == 4) executor.stop();
+                  if (served == 4) executor.stop();
                 },
                 {.priority = priority});
   };
+  // The only worker goes on with it once nobody else is ready: the last client has asked.
+  executor.add(once("watcher",
+                    [&]() -> Coroutine {
+                      co_await turn[4];
+                      all_asked = true;
+                    },
+                    {.priority = 0}));
   executor.add(client(9, 0));
   executor.add(client(1, 1));
   executor.add(client(2, 2));
