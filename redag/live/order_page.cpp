@@ -25,7 +25,7 @@ constexpr std::string_view kTitle = "redag-order 1\n";
 constexpr std::string_view kEnd = "end\n";
 constexpr std::string_view kOrderPrefix = "redag-order.";
 constexpr std::string_view kUnfinished = ".new";  // behind the name of a page that is being written
-constexpr std::size_t kLongestText = 64 * 1024;
+constexpr std::size_t kLongestText = std::size_t{64} * 1024;
 constexpr unsigned kMostExecutors = 1000;  // of one process
 constexpr int kMostPriority = 99;
 

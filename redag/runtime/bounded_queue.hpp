@@ -117,8 +117,7 @@ class BoundedQueue {
       if (place == read_.other) return std::nullopt;
     }
     std::optional<T> &slot = slots_[place % slots_.size()];
-    std::optional<T> value = std::move(slot);
-    slot.reset();
+    std::optional<T> value = std::exchange(slot, std::nullopt);
     read_.place.store(place + 1, std::memory_order_release);
     return value;
   }
