@@ -224,7 +224,9 @@ class Waits(Case):
                 for kind in ("waits", "served", "woken"):
                     self.assertIn(kind, events)
                 self.expect(redag("check-trace", out), 0)
-                self.assertIn("waited without a worker", self.expect(redag("why", out, "lidar.segment#0"), 0).stdout)
+                task, number = json.loads(next(line for line in events.splitlines() if '"woken"' in line))[2:4]
+                job = {4: "camera.detect", 6: "lidar.segment"}[task] + f"#{number}"
+                self.assertIn("waited without a worker", self.expect(redag("why", out, job), 0).stdout)
 
     def test_others_refuse_them(self):
         where = f"{self.FILE}:{1 + self.FILE.read_text().splitlines().index(self.segments())}:"
