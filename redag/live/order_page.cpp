@@ -16,6 +16,7 @@
 #include <system_error>
 #include <tuple>
 
+#include "redag/base/write_all.hpp"
 #include "redag/live/owned_file.hpp"
 
 namespace redag::live {
@@ -103,16 +104,6 @@ std::optional<OrderStatement> read_statement(const std::string &path) {
 tl::unexpected<Diagnostics> not_possible(const std::string &path, int error) {
   return make_error(fmt::format("{}: {}", path, std::generic_category().message(error)),
                     "executors that share an order need a folder where this user may create files");
-}
-
-int write_all(int descriptor, std::string_view text) {
-  while (!text.empty()) {
-    const ssize_t written = ::write(descriptor, text.data(), text.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) return errno;
-    text.remove_prefix(static_cast<std::size_t>(written));
-  }
-  return 0;
 }
 
 }  // namespace

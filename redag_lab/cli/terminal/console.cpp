@@ -14,6 +14,7 @@
 #include <cstring>
 
 #include "redag/base/text.hpp"
+#include "redag/base/write_all.hpp"
 #include "redag_analysis/text/tint.hpp"
 #include "redag_analysis/text/wrap.hpp"
 
@@ -71,17 +72,6 @@ std::string for_terminal(std::string_view text) {
     at = end;
   }
   return shown;
-}
-
-// Writes all of `text`. Returns the errno of a failure, or 0.
-int write_all(int descriptor, std::string_view text) {
-  while (!text.empty()) {
-    const ssize_t written = ::write(descriptor, text.data(), text.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) return errno;
-    text.remove_prefix(static_cast<std::size_t>(written));
-  }
-  return 0;
 }
 
 }  // namespace
