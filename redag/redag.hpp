@@ -11,6 +11,7 @@
 #include "redag/model/workload.hpp"
 #include "redag/model/workload_yaml.hpp"
 #include "redag/runtime/async_event.hpp"
+#include "redag/runtime/blocking.hpp"
 #include "redag/runtime/bounded_queue.hpp"
 #include "redag/runtime/coroutine.hpp"
 #include "redag/runtime/dag_builder.hpp"

@@ -12,6 +12,7 @@ namespace redag::runtime::detail {
 void Wait::suspend(std::coroutine_handle<> its_coroutine) noexcept {
   RunningJob *const running = RunningJob::current();
   REDAG_CHECK(running != nullptr, "a coroutine waits that no engine runs");
+  REDAG_CHECK(!running->blocks, "a coroutine waits inside a redag::Blocking");
   coroutine = its_coroutine;
   engine = running->engine;
   job = running->slot;

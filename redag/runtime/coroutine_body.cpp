@@ -20,7 +20,8 @@ sched::Outcome begin(RunningJob &running, Coroutine body) {
   }
   // If there is no memory, the job ends, and does not wait.
   detail::Wait *const wait = std::exchange(running.wait, nullptr);
-  running.waiting = new WaitingJob(std::move(body));
+  if (running.waiting == nullptr) running.waiting = new WaitingJob();
+  running.waiting->coroutine = std::move(body);
   running.wait = wait;
   return sched::Outcome::Finished;
 }

@@ -29,19 +29,13 @@ namespace redag::runtime {
 namespace {
 
 using namespace std::chrono_literals;
+using testing::once;
 using testing::one_worker;
 
 ExecutorOptions with_gpu(PreemptionMode mode = PreemptionMode::None) {
   ExecutorOptions options = one_worker(mode);
   options.devices = {{.name = "gpu"}};
   return options;
-}
-
-// A DAG whose only task runs `body` once, when the executor starts.
-DagBuilder once(const std::string &name, TaskBody body, TaskOptions options = {}) {
-  DagBuilder dag(name);
-  dag.timer("task", 1h, std::move(body), options);
-  return dag;
 }
 
 std::vector<JobEventKind> kinds_of(const std::vector<JobEvent> &events, TaskId task) {

@@ -30,12 +30,14 @@ Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions option
     : options_(std::move(options)),
       lock_(realtime()),
       scheduler_(std::move(scheduler)),
-      pool_(os() ? options_.config.max_started : options_.config.workers, options_.trace_capacity),
+      pool_(os() ? options_.config.max_started : options_.config.workers + options_.spare_threads,
+            options_.trace_capacity),
       tasks_(options_.measure),
       lookout_(posts_silently() ? std::make_unique<HelperThread>() : nullptr),
       devices_(options_.devices),
       waiting_(devices_),
-      placement_(pool_, waiting_, os(), options_.band, lookout_ ? &lookout_->parker : nullptr),
+      placement_(pool_, waiting_, os(), options_.band, lookout_ ? &lookout_->parker : nullptr,
+                 os() ? sched::kNoLimit : options_.spare_threads),
       paused_(options_.start_paused),
       decisions_(options_.trace_capacity) {
   const sched::Config &config = options_.config;

@@ -71,6 +71,9 @@ struct EngineOptions {
   MissLog *misses = nullptr;       // every miss is noted there; must outlive the engine
   // none, cooperative: how many spins a thread without a job makes before it sleeps; see spins_in().
   std::uint32_t spins = 0;
+  // none, cooperative: threads besides the workers, for jobs that block in a redag::Blocking. With `os`, each started
+  // job has a thread of its own.
+  std::uint32_t spare_threads = 0;
   std::size_t touched_stack = 0;  // bytes of each worker thread's stack; see ThreadSetup
   std::vector<Device> devices;    // those with which the scheduler was built
   // SCHED_FIFO priority of the threads that wake jobs and serve them at devices; 0: ordinary threads.
@@ -104,6 +107,7 @@ struct TaskFigures {
   std::uint32_t ready = 0;
   std::uint32_t most_waits = 0;       // of a job
   Duration longest_waits = 0;         // of a job, together: from each co_await until it is woken
+  std::uint64_t kept_worker = 0;      // calls that block for which no thread was left
   std::uint64_t late = 0;             // finished after the deadline
   std::uint64_t late_end_to_end = 0;  // of a sink: finished after the DAG's deadline
   // Zero or null unless EngineOptions::measure is set:
@@ -277,6 +281,8 @@ class Engine {
   void count_late(const Job &job, TaskEntry &entry, Time at) REDAG_REQUIRES(lock_);
   void note_misses(Locked &locked, const Job &job, const TaskEntry &entry, Time at, sched::Outcome outcome)
       REDAG_REQUIRES(lock_);
+  bool lend_worker(RunningJob &running);
+  void take_worker(RunningJob &running);
   void preemption_point(RunningJob &job);
   void reach_limit(RunningJob &job, Duration used);
 

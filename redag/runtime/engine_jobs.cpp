@@ -105,6 +105,7 @@ void Engine::run(Taker &taker, Time at) noexcept {
     if (const std::optional<Time> next = suspend(taker, running)) return *next;
     outcome = Outcome::BudgetExceeded;
   }
+  if (running.waiting != nullptr) delete std::exchange(running.waiting, nullptr);  // the body has blocked
   if (is_traced || tap != nullptr) tell(JobEventKind::Executed, running.ended, running.charged);
   return finish(taker, running, outcome, doomed);
 }
@@ -221,9 +222,18 @@ Duration RunningJob::stretch_cpu_time() const noexcept {
   return start.exact ? used : std::min(used, engine->now() - here_since);
 }
 
+void RunningJob::charge(Duration stretch) noexcept {
+  before += stretch;
+  start = CpuMeter::Start{thread_cpu_now(), true};
+}
+
 void RunningJob::reach_preemption_point() { engine->preemption_point(*this); }
 
 void RunningJob::reach_limit(Duration used) { engine->reach_limit(*this, used); }
+
+bool RunningJob::lend_worker() { return engine->lend_worker(*this); }
+
+void RunningJob::take_worker() noexcept { engine->take_worker(*this); }
 
 // At a preemption point: reports the limits that the job has used to the scheduler, or cuts the job off.
 void Engine::reach_limit(RunningJob &job, Duration used) {

@@ -142,6 +142,7 @@ TaskFigures Engine::figures(TaskId task) const {
                       .ready = scheduler_->ready(task),
                       .most_waits = entry.most_waits,
                       .longest_waits = entry.longest_waits,
+                      .kept_worker = entry.kept_worker,
                       .late = entry.late,
                       .late_end_to_end = entry.late_end_to_end,
                       .preemptions = entry.preemptions,

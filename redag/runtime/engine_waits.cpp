@@ -81,6 +81,61 @@ std::optional<Time> Engine::suspend(Taker &taker, RunningJob &running) {
   return delayed || !running.on_trust ? now() : at;
 }
 
+// The body is about to block: as suspend(), but the job keeps its thread.
+bool Engine::lend_worker(RunningJob &running) {
+  if (running.blocks || running.thread == pool_.caller().index) return false;
+  WorkerThread &self = pool_[running.thread];
+  if (running.waiting == nullptr) running.waiting = new WaitingJob();
+  WaitingJob &job = *running.waiting;
+  const Duration used = running.stretch_cpu_time();
+  const Time at = now();
+  Locked locked(*this);
+  withdraw_if_halting(locked);
+  job.job = self.stack.back();
+  job.entry = &tasks_[running.task];
+  if (running.below != nullptr || !placement_.lend(self)) {
+    ++job.entry->kept_worker;
+    return false;
+  }
+  running.leave();
+  running.charge(used);
+  self.used += used;
+  running.earlier += at - running.here_since;
+  running.limit = kNever;  // preemption points do nothing meanwhile
+  running.blocks = true;
+  job.thread = &self;
+  job.wait = nullptr;
+  job.begun = running.begun;
+  job.charged = running.before;
+  job.reported = running.reported;
+  waiting_.add(job, at);
+  scheduler_->wait(running.slot, DeviceId(), at);
+  decide(locked, at);
+  return true;
+}
+
+// The call that blocked has returned. Waits for a worker.
+void Engine::take_worker(RunningJob &running) {
+  WorkerThread &self = pool_[running.thread];
+  const Duration used = running.stretch_cpu_time();  // in the scope, without a worker
+  running.charge(used);
+  const Time at = now();
+  {
+    Locked locked(*this);
+    self.used += used;
+    wake(locked, running.slot, at);
+    decide(locked, at);
+  }
+  do {
+    self.parker.park();
+  } while (!self.goes_on.exchange(false, std::memory_order_acquire));
+  running.reported = running.waiting->reported;
+  running.limit = running.waiting->entry->next_limit(running);
+  running.here_since = now();
+  running.blocks = false;
+  running.enter();
+}
+
 void Engine::wake(Locked &locked, JobSlot job, Time at) {
   withdraw_if_halting(locked);
   waiting_.end(job, at);

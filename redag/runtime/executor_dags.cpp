@@ -189,6 +189,7 @@ DagStats Executor::Impl::stats(DagId dag) const {
                                     .usage = figures.usage,
                                     .deadline = of.dag.tasks[i].deadline,
                                     .late = figures.late,
+                                    .kept_worker = figures.kept_worker,
                                     .early = of.sources[i] == nullptr ? 0 : of.sources[i]->early(),
                                     .response = distribution_of(figures.response.get())});
     if (has_successor[i]) continue;

@@ -12,13 +12,15 @@ namespace redag::runtime {
 using sched::Dispatch;
 using sched::DispatchKind;
 
-JobPlacement::JobPlacement(WorkerPool &pool, WaitingJobs &waiting, bool os, const PriorityBand &band, Parker *lookout)
+JobPlacement::JobPlacement(WorkerPool &pool, WaitingJobs &waiting, bool os, const PriorityBand &band, Parker *lookout,
+                           std::uint32_t spare)
     : pool_(pool),
       waiting_(waiting),
       os_(os),
       band_(band),
       priorities_(os ? pool.size() : 0, band.top_job),
-      mailboxes_(pool.size(), lookout) {}
+      mailboxes_(pool.size(), lookout),
+      spare_(spare) {}
 
 void JobPlacement::start(std::size_t processors) {
   priorities_.set_processors(processors);
@@ -38,6 +40,10 @@ void JobPlacement::place(const sched::Step &step, const Situation &situation, Ta
     if (!needs_thread(dispatch)) {
       if (dispatch.kind == DispatchKind::Serve) {
         waiting_.serve(dispatch.job);
+        continue;
+      }
+      if (const WaitingJob *woken = find_woken(dispatch)) {
+        end_lending(*woken->thread, dispatch, tasks[dispatch.task], wake_ups);
         continue;
       }
       const bool resumes = taker != nullptr && dispatch.kind == DispatchKind::Resume && dispatch.job == taker->below;
@@ -107,18 +113,35 @@ void JobPlacement::leave(WorkerThread &thread) {
   if (os_ && &thread != &pool_.caller()) priorities_.end(thread.index);
 }
 
-void JobPlacement::fill_woken(WorkerThread &thread, const Dispatch &dispatch, const TaskEntry &entry,
-                              Assignment &assignment) {
+// The thread has the job from now on.
+WaitingJob &JobPlacement::take_woken(WorkerThread &thread, const Dispatch &dispatch, const TaskEntry &entry) {
   WaitingJob &job = *waiting_.find(dispatch.job);
   waiting_.remove(dispatch.job);
   job.job.worker = dispatch.worker;
+  thread.level = dispatch.level;
+  thread.is_spared = dispatch.inherits || entry.is_high;
+  return job;
+}
+
+void JobPlacement::fill_woken(WorkerThread &thread, const Dispatch &dispatch, const TaskEntry &entry,
+                              Assignment &assignment) {
+  WaitingJob &job = take_woken(thread, dispatch, entry);
   assignment.job = job.job;
   assignment.entry = job.entry;
   assignment.woken = &job;
   assignment.measured = job.measured;
   assignment.expected_short = entry.expected_short();
-  thread.level = dispatch.level;
-  thread.is_spared = dispatch.inherits || entry.is_high;
+}
+
+void JobPlacement::end_lending(WorkerThread &thread, const Dispatch &dispatch, const TaskEntry &entry,
+                               WakeUps &wake_ups) {
+  WaitingJob &job = take_woken(thread, dispatch, entry);
+  job.thread = nullptr;
+  thread.stack.push_back(job.job);
+  --blocking_;
+  if (os_) apply(priorities_.start(thread.index, priority_of(thread), false));
+  thread.goes_on.store(true, std::memory_order_release);
+  wake_ups.wake(thread);
 }
 
 // With `os`, the leader is above all jobs while it waits, as the release thread is.

@@ -48,7 +48,9 @@ struct Situation {
 class JobPlacement {
  public:
   /// os: the kernel schedules the threads by their priorities in `band`. For `lookout` see Mailboxes.
-  JobPlacement(WorkerPool &pool, WaitingJobs &waiting, bool os, const PriorityBand &band, Parker *lookout);
+  /// `spare`: how many threads there are besides those that can have jobs with a worker.
+  JobPlacement(WorkerPool &pool, WaitingJobs &waiting, bool os, const PriorityBand &band, Parker *lookout,
+               std::uint32_t spare);
 
   /// All threads wait for jobs, on that many processors.
   void start(std::size_t processors);
@@ -80,6 +82,14 @@ class JobPlacement {
   }
   /// The thread's topmost job waits. It is among the waiting jobs until it has a thread again.
   void leave(WorkerThread &thread);
+  /// The thread's topmost job blocks. It is among the waiting jobs until it has a worker again. Returns false, and
+  /// changes nothing, if that would leave too few threads for the jobs that have workers.
+  [[nodiscard]] bool lend(WorkerThread &thread) {
+    if (blocking_ == spare_) return false;
+    ++blocking_;
+    leave(thread);
+    return true;
+  }
 
   /// For the lookout: returns true if it should look again.
   bool look(WakeUps &wake_ups) { return mailboxes_.look(wake_ups); }
@@ -109,7 +119,12 @@ class JobPlacement {
   /// Returns true if the job needs a thread: it starts, or it has waited and goes on.
   [[nodiscard]] bool needs_thread(const sched::Dispatch &dispatch) const {
     if (dispatch.kind == sched::DispatchKind::Start) return true;
-    return dispatch.kind == sched::DispatchKind::Resume && waiting_.find(dispatch.job) != nullptr;
+    const WaitingJob *woken = find_woken(dispatch);
+    return woken != nullptr && woken->thread == nullptr;
+  }
+  /// Returns the job if it has waited and goes on, or null.
+  [[nodiscard]] WaitingJob *find_woken(const sched::Dispatch &dispatch) const {
+    return dispatch.kind == sched::DispatchKind::Resume ? waiting_.find(dispatch.job) : nullptr;
   }
   const sched::Dispatch *choose_own(const sched::Step &step, JobSlot below) const;
   const sched::Dispatch *serve(Taker &taker, const sched::Step &step, const Situation &situation, TaskTable &tasks);
@@ -127,6 +142,8 @@ class JobPlacement {
   }
   void fill_woken(WorkerThread &thread, const sched::Dispatch &dispatch, const TaskEntry &entry,
                   Assignment &assignment);
+  WaitingJob &take_woken(WorkerThread &thread, const sched::Dispatch &dispatch, const TaskEntry &entry);
+  void end_lending(WorkerThread &thread, const sched::Dispatch &dispatch, const TaskEntry &entry, WakeUps &wake_ups);
   static void fill(WorkerThread &thread, const sched::Dispatch &dispatch, TaskEntry &entry, Assignment &assignment) {
     REDAG_CHECK(entry.busy < entry.concurrency, "more jobs of one task at a time than it allows");
     ++entry.busy;
@@ -164,6 +181,8 @@ class JobPlacement {
   PriorityBand band_;
   ThreadPriorities priorities_;  // os
   Mailboxes mailboxes_;
+  const std::uint32_t spare_;
+  std::uint32_t blocking_ = 0;  // jobs that block, each on its thread
   std::uint32_t unfinished_ = 0;
   std::uint64_t refused_priorities_ = 0;
   bool giving_way_ = false;

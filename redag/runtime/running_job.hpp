@@ -55,6 +55,7 @@ struct RunningJob {
   bool used_budget = false;
   bool reported = false;          // was reported overdue; written under the engine's lock
   bool cancelled = false;         // it ended because its wait was cancelled
+  bool blocks = false;            // it has lent its worker: it is in a redag::Blocking
   WaitingJob *waiting = nullptr;  // what is kept of it between its waits; null: it has not waited
   detail::Wait *wait = nullptr;   // set by the body: what it waits for now; null: it has ended
   // Set by close():
@@ -64,10 +65,15 @@ struct RunningJob {
 
   void reach_preemption_point();
   void reach_limit(Duration used);
+  /// The body is about to block: other jobs have its worker until take_worker(). Returns false if it keeps it.
+  [[nodiscard]] bool lend_worker();
+  void take_worker() noexcept;
   /// Processor time until now, never too little. If its start is not exact, at most what the job took on the clock.
   [[nodiscard]] Duration cpu_time() const noexcept { return before + stretch_cpu_time(); }
   /// The same since the job's last wait.
   [[nodiscard]] Duration stretch_cpu_time() const noexcept;
+  /// Adds what its last stretch has used to what it had used before, and begins another stretch.
+  void charge(Duration stretch) noexcept;
   /// Ends the job: sets `ended` and `charged`. A body that is about to return and needs them may call it. Otherwise the
   /// engine does. Later calls have no effect. A job that is over within CpuMeter::kShort is charged this time on trust:
   /// asking for its processor time would be a system call.

@@ -50,10 +50,11 @@ struct TaskStats {
   std::string task;  // "control.ekf"
   sched::Accounting jobs;
   Usage usage;
-  Duration deadline = 0;       // relative to the release
-  std::uint64_t late = 0;      // finished after the deadline
-  std::uint64_t early = 0;     // of a DagBuilder::event(): releases before the minimum inter-arrival time had passed
-  Distribution response = {};  // of finished jobs, from the release
+  Duration deadline = 0;          // relative to the release
+  std::uint64_t late = 0;         // finished after the deadline
+  std::uint64_t kept_worker = 0;  // scopes of redag::Blocking in which a job kept its worker; see Blocking::lends()
+  std::uint64_t early = 0;        // of a DagBuilder::event(): releases before the minimum inter-arrival time had passed
+  Distribution response = {};     // of finished jobs, from the release
 
   /// Jobs that finished late, were skipped, or were aborted although they had data. Jobs in flight do not count yet.
   [[nodiscard]] std::uint64_t misses() const { return late + jobs.lost(); }

@@ -92,6 +92,7 @@ struct TaskEntry {
   std::uint64_t cancelled = 0;    // jobs whose wait was ended by halt()
   std::uint32_t most_waits = 0;   // of a job
   Duration longest_waits = 0;     // of a job, together
+  std::uint64_t kept_worker = 0;  // calls that block for which no thread was left
   std::uint32_t concurrency = 0;  // jobs that can be in progress at once
   std::uint32_t busy = 0;         // jobs that have started and not ended
   std::uint32_t short_jobs = 0;   // consecutive short jobs up to now; at most kStreak

@@ -36,7 +36,7 @@ bool WaitingJobs::begin(detail::Wait &wait) {
 
 void WaitingJobs::end(JobSlot slot, Time now) {
   WaitingJob &job = *by_slot_[slot.value];
-  job.wait->is_over = true;
+  if (job.wait != nullptr) job.wait->is_over = true;
   job.waited += std::max<Duration>(0, now - job.since);
   job.entry->most_waits = std::max(job.entry->most_waits, ++job.waits);
   job.entry->longest_waits = std::max(job.entry->longest_waits, job.waited);
@@ -60,7 +60,7 @@ void WaitingJobs::cancel_all() {
   stopped_ = true;
   sleepers_.clear();
   for_each([this](WaitingJob &job) {
-    if (cancel(*job.wait)) cancelled_.push_back(job.job.slot);
+    if (job.wait != nullptr && cancel(*job.wait)) cancelled_.push_back(job.job.slot);
   });
 }
 

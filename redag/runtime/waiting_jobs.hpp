@@ -1,15 +1,14 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The jobs that wait without a thread (docs/model.md, "Waits"), and those that are woken and have no thread yet. Knows
-// what each waits for, begins its wait and can end it early. When a wait ends, it is the engine that tells the
+// The jobs that wait without a worker (docs/model.md, "Waits"), and those that are woken and have none yet. Knows what
+// each waits for, begins its wait and can end it early. When a wait ends, it is the engine that tells the
 // scheduler. Allocates in reserve(), and where a job waits in a larger slot than any before. Not thread-safe: the
 // engine's lock guards it.
 #pragma once
 
 #include <bit>
 #include <cstddef>
-#include <utility>
 #include <vector>
 
 #include "redag/runtime/coroutine.hpp"
@@ -20,13 +19,13 @@
 namespace redag::runtime {
 
 struct TaskEntry;
+struct WorkerThread;
 
 /// A job whose body has waited, from its first wait to its end. While the body runs, its thread alone uses it.
 struct WaitingJob {
-  explicit WaitingJob(Coroutine body) : coroutine(std::move(body)) {}
-
-  Coroutine coroutine;           // the body; awaits others
-  detail::Wait *wait = nullptr;  // what it waits for; its coroutine goes on first
+  Coroutine coroutine;             // the body; awaits others. Empty: another kind of body
+  detail::Wait *wait = nullptr;    // what it waits for; its coroutine goes on first. Null: a call that blocks
+  WorkerThread *thread = nullptr;  // on which it blocks, and goes on; null: it has none
   // Of the job until its last wait:
   Job job;
   TaskEntry *entry = nullptr;
@@ -81,7 +80,7 @@ class WaitingJobs {
 
   /// Begins the wait of a job, except at a device, where it queues first. Returns false if the wait is over already.
   [[nodiscard]] bool begin(detail::Wait &wait);
-  /// The wait of a job is over: it is woken.
+  /// The wait of a job is over: it is woken. A call that blocks is not begun here, and cannot be cancelled.
   void end(JobSlot slot, Time now);
   /// A device has a slot for the job: a thread of the device begins to serve it. After cancel_all() the job's wait is
   /// cancelled instead.

@@ -45,11 +45,12 @@ struct alignas(64) WorkerThread {
   // it: this one, without the lock, or one that steals it before this one is awake, under the lock.
   Assignment mail;
   Atomic<bool> has_mail{false};
-  Atomic<bool> leads{false};  // waits for releases when it is idle; written under the lock
-  Atomic<Time> wakes_at{0};   // of the leader, on the engine's clock; 0: it is awake; written by the thread
-  bool led = false;           // used by the thread only: the release thread leaves releases to it
-  bool is_handed = false;     // lock: is in JobPlacement::handed_
-  bool in_tiny_job = false;   // lock: its job is expected to be tiny, and it looks for others' mail afterwards
+  Atomic<bool> leads{false};    // waits for releases when it is idle; written under the lock
+  Atomic<Time> wakes_at{0};     // of the leader, on the engine's clock; 0: it is awake; written by the thread
+  Atomic<bool> goes_on{false};  // its job, which blocked, has a worker again; written under the lock
+  bool led = false;             // used by the thread only: the release thread leaves releases to it
+  bool is_handed = false;       // lock: is in JobPlacement::handed_
+  bool in_tiny_job = false;     // lock: its job is expected to be tiny, and it looks for others' mail afterwards
   // lock: a number if its mail did not wake it, and 0 otherwise. Larger numbers are later.
   std::uint64_t silent = 0;
   std::uint32_t level = 0;        // lock: of the job that it was given last; inherited only with `os`

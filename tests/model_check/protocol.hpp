@@ -129,6 +129,7 @@ struct Platform {
   std::size_t trace_capacity = 0;
   std::uint32_t spins = 0;  // looks for a job before a thread sleeps
   std::optional<runtime::Throttling> throttling = std::nullopt;
+  std::uint32_t spare_threads = 0;  // for jobs that block
 };
 
 /// An engine with given task bodies. Checks that every job runs once, and that the scheduler's counts match.
@@ -151,6 +152,7 @@ class Machine {
     options.start_paused = platform.start_paused;
     options.trace_capacity = platform.trace_capacity;
     options.spins = platform.spins;
+    options.spare_threads = platform.spare_threads;
     options.on_exception = [this](const Job &, const std::exception_ptr &) { ++exceptions; };
     engine = std::make_unique<Engine>(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
     std::vector<runtime::Body> bodies;
