@@ -178,21 +178,59 @@ TEST(Blocking, AJobOnTopOfAnotherKeepsItsWorker) {
   options.policy = PolicyKind::Fixed;
   Executor executor(options);
   std::atomic<bool> ended{false};
+  DagBuilder builder("urgent");
+  const EventHandle event = builder.event("task", 1h,
+                                          [&] {
+                                            const Blocking scope;
+                                            EXPECT_FALSE(scope.lends());
+                                            ended = true;
+                                          },
+                                          {.priority = 2});
+  const DagId urgent = executor.add(std::move(builder));
   executor.add(once("below",
                     [&] {
+                      executor.release(event);
                       while (!ended) preemption_point();
                       executor.stop();
                     },
                     {.priority = 1}));
-  const DagId urgent = executor.add(once("urgent",
-                                         [&] {
-                                           const Blocking scope;
-                                           EXPECT_FALSE(scope.lends());
-                                           ended = true;
-                                         },
-                                         {.offset = 2ms, .priority = 2}));
   executor.run();
   EXPECT_EQ(executor.stats(urgent)[0].kept_worker, 1U);
+}
+
+// The urgent job's call returns while another job has the worker. It then preempts that job at its preemption point,
+// but from another thread: the preempted job waits there.
+TEST(Blocking, AJobYieldsToOneThatHasBlocked) {
+  ExecutorOptions options = with_spare_threads(PreemptionMode::Cooperative);
+  options.policy = PolicyKind::Fixed;
+  Executor executor(options);
+  std::latch answer(1);
+  std::atomic<bool> urgent_runs{false};
+  std::atomic<bool> urgent_ended{false};
+  executor.add(once("urgent",
+                    [&] {
+                      {
+                        const Blocking scope;
+                        answer.wait();
+                      }
+                      urgent_runs = true;
+                      for (const Duration end = job_cpu_time() + 2 * kMillisecond; job_cpu_time() < end;) {
+                      }
+                      urgent_runs = false;
+                      urgent_ended = true;
+                    },
+                    {.priority = 2}));
+  executor.add(once("other",
+                    [&] {
+                      answer.count_down();
+                      while (!urgent_ended) {
+                        preemption_point();
+                        EXPECT_FALSE(urgent_runs);
+                      }
+                      executor.stop();
+                    },
+                    {.offset = 1ms, .priority = 1}));
+  executor.run();
 }
 
 TEST_P(BlockingInEveryMode, TheStopWaitsForTheCall) {

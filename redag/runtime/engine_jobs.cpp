@@ -315,13 +315,15 @@ void Engine::preemption_point(RunningJob &job) {
     scheduler_->preemption_point(job.slot, at);
     decide(locked, at, &taker);
   }
-  if (taker.next.kind != Next::Kind::Start) return;
-  const Duration used = job.stretch_cpu_time();
-  taker.thread.meter.pass();
-  run(taker, at);
-  REDAG_CHECK(taker.next.kind == Next::Kind::Resume, "a suspended job was not resumed");
-  job.start = CpuMeter::Start{thread_cpu_now() - used, true};
-  job.enter();
+  if (taker.next.kind == Next::Kind::Start) {
+    const Duration used = job.stretch_cpu_time();
+    taker.thread.meter.pass();
+    run(taker, at);
+    REDAG_CHECK(taker.next.kind != Next::Kind::Nothing, "a suspended job was not resumed");
+    job.start = CpuMeter::Start{thread_cpu_now() - used, true};
+    job.enter();
+  }
+  if (taker.next.kind == Next::Kind::Yield) taker.thread.wait_for_worker();
 }
 
 }  // namespace redag::runtime

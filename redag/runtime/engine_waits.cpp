@@ -126,9 +126,7 @@ void Engine::take_worker(RunningJob &running) {
     wake(locked, running.slot, at);
     decide(locked, at);
   }
-  do {
-    self.parker.park();
-  } while (!self.goes_on.exchange(false, std::memory_order_acquire));
+  self.wait_for_worker();
   running.reported = running.waiting->reported;
   running.limit = running.waiting->entry->next_limit(running);
   running.here_since = now();

@@ -43,11 +43,17 @@ void JobPlacement::place(const sched::Step &step, const Situation &situation, Ta
         continue;
       }
       if (const WaitingJob *woken = find_woken(dispatch)) {
+        if (taker != nullptr && taker->below.valid() && dispatch.over == taker->below) yield(*taker);
         end_lending(*woken->thread, dispatch, tasks[dispatch.task], wake_ups);
         continue;
       }
-      const bool resumes = taker != nullptr && dispatch.kind == DispatchKind::Resume && dispatch.job == taker->below;
-      if (resumes) taker->next.kind = Next::Kind::Resume;
+      if (dispatch.kind == DispatchKind::Resume) {
+        if (taker != nullptr && dispatch.job == taker->below) {
+          taker->next.kind = Next::Kind::Resume;
+        } else if (yielding_ > 0) {
+          end_yield(dispatch.job, wake_ups);
+        }
+      }
       if (os_) change_level(dispatch, tasks);
       continue;
     }
@@ -159,6 +165,24 @@ void JobPlacement::move_job(WorkerThread &from, WorkerThread &to, bool may_lead,
   if (os_) priorities_.end(from.index);
   set_priority_for_job(to, assignment);
   add_idle(from, may_lead);
+}
+
+// The job on the taker's thread is preempted by one that goes on on a thread of its own.
+void JobPlacement::yield(Taker &taker) {
+  taker.next.kind = Next::Kind::Yield;
+  taker.thread.yields = true;
+  ++yielding_;
+}
+
+void JobPlacement::end_yield(JobSlot job, WakeUps &wake_ups) {
+  for (const auto &thread : pool_.threads()) {
+    if (!thread->yields || thread->stack.back().slot != job) continue;
+    thread->yields = false;
+    --yielding_;
+    thread->goes_on.store(true, std::memory_order_release);
+    wake_ups.wake(*thread);
+    return;
+  }
 }
 
 void JobPlacement::change_level(const Dispatch &dispatch, const TaskTable &tasks) {

@@ -26,6 +26,7 @@ struct Next {
     Nothing,  // waits for mail
     Start,    // runs `assignment`
     Resume,   // returns to the job below
+    Yield,    // keeps the job below, which a job on another thread has preempted: waits until that one is done
   };
   Kind kind = Kind::Nothing;
   Assignment assignment;
@@ -160,6 +161,8 @@ class JobPlacement {
     thread.level = dispatch.level;
     thread.is_spared = dispatch.inherits || entry.is_high;
   }
+  void yield(Taker &taker);
+  void end_yield(JobSlot job, WakeUps &wake_ups);
   void change_level(const sched::Dispatch &dispatch, const TaskTable &tasks);
   void set_priority_for_job(WorkerThread &thread, const Assignment &assignment);
   void move_priority(WorkerThread &thread, const Assignment &assignment);
@@ -183,6 +186,7 @@ class JobPlacement {
   Mailboxes mailboxes_;
   const std::uint32_t spare_;
   std::uint32_t blocking_ = 0;  // jobs that block, each on its thread
+  std::uint32_t yielding_ = 0;  // threads that wait after Next::Kind::Yield
   std::uint32_t unfinished_ = 0;
   std::uint64_t refused_priorities_ = 0;
   bool giving_way_ = false;

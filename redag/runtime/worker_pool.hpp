@@ -39,6 +39,13 @@ struct alignas(64) WorkerThread {
     return has_mail.load(std::memory_order_relaxed) && has_mail.exchange(false, std::memory_order_acquire);
   }
 
+  /// Sleeps until its job, which has blocked or yielded, has a worker again.
+  void wait_for_worker() noexcept {
+    do {
+      parker.park();
+    } while (!goes_on.exchange(false, std::memory_order_acquire));
+  }
+
   std::uint32_t index;
   Parker parker;
   // Written under the lock, by the thread that dispatches, while this thread has no job. Read by the thread that took
@@ -47,7 +54,8 @@ struct alignas(64) WorkerThread {
   Atomic<bool> has_mail{false};
   Atomic<bool> leads{false};    // waits for releases when it is idle; written under the lock
   Atomic<Time> wakes_at{0};     // of the leader, on the engine's clock; 0: it is awake; written by the thread
-  Atomic<bool> goes_on{false};  // its job, which blocked, has a worker again; written under the lock
+  Atomic<bool> goes_on{false};  // its job, which has blocked or yielded, has a worker again; written under the lock
+  bool yields = false;          // lock: a job on another thread has preempted its job
   bool led = false;             // used by the thread only: the release thread leaves releases to it
   bool is_handed = false;       // lock: is in JobPlacement::handed_
   bool in_tiny_job = false;     // lock: its job is expected to be tiny, and it looks for others' mail afterwards

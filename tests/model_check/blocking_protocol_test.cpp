@@ -76,6 +76,37 @@ TEST_P(BlockingProtocol, AHaltWaitsForTheCall) {
   });
 }
 
+// The more urgent job blocks, and goes on while the other one has the worker and reaches a preemption point.
+TEST_P(BlockingProtocol, AtMostOneJobHasTheWorker) {
+  if (GetParam() == Preemption::Full) GTEST_SKIP() << "the kernel decides which of two threads runs";
+  expect_holds([] {
+    Countdown ended(2);
+    Room worker(1);
+    const auto client = [&](const Job &) {
+      { const Blocking scope; }
+      worker.enter();
+      worker.leave();
+      ended.count();
+      return Outcome::Finished;
+    };
+    const auto other = [&](const Job &) {
+      worker.enter();
+      worker.leave();
+      preemption_point();
+      worker.enter();
+      worker.leave();
+      ended.count();
+      return Outcome::Finished;
+    };
+    Machine machine(ladder(2), platform(), {other, client});
+    machine.start_calmly();
+    machine.release(1);
+    machine.release(0);
+    ended.wait();
+    machine.finish_calmly();
+  });
+}
+
 // The second job to block finds no thread left where there is one spare thread, and keeps its worker.
 TEST_P(BlockingProtocol, TwoJobsBlock) {
   expect_holds([] {
