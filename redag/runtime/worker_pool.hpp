@@ -43,7 +43,7 @@ struct alignas(64) WorkerThread {
   void wait_for_worker() noexcept {
     do {
       parker.park();
-    } while (false);
+    } while (!goes_on.exchange(false, std::memory_order_acquire));
   }
 
   std::uint32_t index;

@@ -21,9 +21,12 @@ Result<RunFiles> RunFiles::create(const FilesOptions &options, const trace::RunI
   const auto path = [&](std::string_view name) { return options.folder + "/" + std::string(name); };
   auto events = trace::EventsWriter::create(path(events_name(options.events_as_text)), run);
   if (!events) return tl::unexpected<Diagnostics>(std::move(events.error()));
-  auto jobs = JobsCsvWriter::create(path(kJobsFile), run.workload);
-  if (!jobs) return tl::unexpected<Diagnostics>(std::move(jobs.error()));
-  RunFiles files(options, run, *std::move(events), *std::move(jobs));
+  RunFiles files(options, run, *std::move(events));
+  if (options.jobs) {
+    auto jobs = JobsCsvWriter::create(path(kJobsFile), run.workload);
+    if (!jobs) return tl::unexpected<Diagnostics>(std::move(jobs.error()));
+    files.jobs_.emplace(*std::move(jobs));
+  }
   if (options.picture == Picture::Never) return files;
   auto picture = PerfettoWriter::create(path(kPictureFile), *files.run_);
   if (!picture) return tl::unexpected<Diagnostics>(std::move(picture.error()));
@@ -33,7 +36,7 @@ Result<RunFiles> RunFiles::create(const FilesOptions &options, const trace::RunI
 
 void RunFiles::add(std::span<const JobEvent> events) {
   events_.add(events);
-  jobs_.add(events);
+  if (jobs_) jobs_->add(events);
   count_ += events.size();
   if (options_.picture == Picture::Auto && picture_ && count_ > kMostPicturedEvents) {
     picture_.reset();
@@ -53,7 +56,11 @@ Diagnostics RunFiles::commit(Time end, std::uint64_t lost_events) {
     std::filesystem::remove(path(name), ignored);
   };
   if (keep(events_.commit(end, lost_events))) remove_stale(events_name(!options_.events_as_text));
-  keep(jobs_.commit());
+  if (jobs_) {
+    keep(jobs_->commit());
+  } else {
+    remove_stale(kJobsFile);
+  }
   if (picture_) {
     keep(picture_->commit(end));
   } else {
@@ -67,7 +74,8 @@ std::string RunFiles::events_path() const { return path(events_name(options_.eve
 std::string RunFiles::picture_path() const { return path(kPictureFile); }
 
 std::string RunFiles::names() const {
-  std::string names = std::string(kJobsFile) + ", " + std::string(events_name(options_.events_as_text));
+  std::string names = jobs_ ? std::string(kJobsFile) + ", " : "";
+  names += events_name(options_.events_as_text);
   if (picture_) names += ", " + std::string(kPictureFile);
   return names;
 }

@@ -35,6 +35,7 @@ inline constexpr std::uint64_t kMostPicturedEvents = 500'000;
 struct FilesOptions {
   std::string folder;           // exists; empty: no files
   bool events_as_text = false;  // events.jsonl instead of events.redag
+  bool jobs = true;             // jobs.csv, of long runs most of the results
   Picture picture = Picture::Auto;
 };
 
@@ -58,18 +59,15 @@ class RunFiles {
   [[nodiscard]] bool lacks_picture() const { return lacks_picture_; }
 
  private:
-  RunFiles(FilesOptions options, const trace::RunInfo &run, trace::EventsWriter events, JobsCsvWriter jobs)
-      : options_(std::move(options)),
-        run_(std::make_unique<trace::RunInfo>(run)),
-        events_(std::move(events)),
-        jobs_(std::move(jobs)) {}
+  RunFiles(FilesOptions options, const trace::RunInfo &run, trace::EventsWriter events)
+      : options_(std::move(options)), run_(std::make_unique<trace::RunInfo>(run)), events_(std::move(events)) {}
 
   [[nodiscard]] std::string path(std::string_view name) const { return options_.folder + "/" + std::string(name); }
 
   FilesOptions options_;
   std::unique_ptr<trace::RunInfo> run_;  // the picture refers to it
   trace::EventsWriter events_;
-  JobsCsvWriter jobs_;
+  std::optional<JobsCsvWriter> jobs_;
   std::optional<PerfettoWriter> picture_;
   std::uint64_t count_ = 0;
   bool lacks_picture_ = false;

@@ -269,6 +269,16 @@ class Events(Case):
         self.assertTrue((out / "trace.pftrace").exists())
         self.results("out", "--picture", "never")
         self.assertEqual(sorted(path.name for path in out.iterdir()), ["events.redag", "jobs.csv", "summary.json"])
+        self.results("out", "--picture", "never", "--jobs", "never")
+        self.assertEqual(sorted(path.name for path in out.iterdir()), ["events.redag", "summary.json"])
+
+    def test_the_jobs_can_be_listed_later(self):
+        listed, not_listed = self.results("with"), self.results("without", "--jobs", "never")
+        made = self.folder / "made.csv"
+        self.expect(redag("events", not_listed, "--format", "jobs"), 2, "name a file with -o")
+        self.expect(redag("events", not_listed, "--format", "jobs", "-o", made), 0)
+        self.assertEqual((listed / "jobs.csv").read_bytes(), made.read_bytes())
+        self.assertNotIn("jobs.csv", redag("simulate", self.cart, "--jobs", "never", "--out", not_listed).stdout)
 
     def test_a_long_run_has_no_picture(self):
         out = self.folder / "out"

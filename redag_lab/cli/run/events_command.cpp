@@ -25,7 +25,7 @@
 namespace redag::cli {
 namespace {
 
-enum class Format : std::uint8_t { Jsonl, Csv, Redag, Perfetto };
+enum class Format : std::uint8_t { Jsonl, Csv, Redag, Jobs, Perfetto };
 
 struct EventsOptions {
   std::string place;
@@ -95,12 +95,28 @@ class CompressingConverter final : public Converter {
   const trace::RunInfo &run_;
 };
 
+/// jobs.csv.
+class JobsConverter final : public Converter {
+ public:
+  explicit JobsConverter(metrics::JobsCsvWriter writer) : writer_(std::move(writer)) {}
+  void add(std::span<const JobEvent> events) override { writer_.add(events); }
+  Result<void> commit() override { return writer_.commit(); }
+
+ private:
+  metrics::JobsCsvWriter writer_;
+};
+
 Result<std::unique_ptr<Converter>> converter_for(const EventsOptions &options, const trace::EventsReader &reader,
                                                  Console &console) {
   if (options.format == Format::Redag) {
     Result<trace::EventsWriter> writer = trace::EventsWriter::create(options.output, reader.info());
     if (!writer) return tl::unexpected<Diagnostics>(std::move(writer.error()));
     return std::make_unique<CompressingConverter>(*std::move(writer), reader.info());
+  }
+  if (options.format == Format::Jobs) {
+    Result<metrics::JobsCsvWriter> writer = metrics::JobsCsvWriter::create(options.output, reader.info().workload);
+    if (!writer) return tl::unexpected<Diagnostics>(std::move(writer.error()));
+    return std::make_unique<JobsConverter>(*std::move(writer));
   }
   std::optional<trace::OutputFile> file;
   if (!options.output.empty()) {
@@ -116,7 +132,7 @@ Result<void> check_place(const EventsOptions &options) {
   namespace fs = std::filesystem;
   if (options.output.empty()) {
     if (options.format == Format::Jsonl || options.format == Format::Csv) return {};
-    return make_error("--format: redag and perfetto are no text to print", "name a file with -o");
+    return make_error("--format: redag, jobs and perfetto are not printed", "name a file with -o");
   }
   if ((options.format == Format::Redag) != options.output.ends_with(".redag")) {
     return make_error("-o: files of the format 'redag', and no others, are called *.redag");
@@ -160,9 +176,12 @@ Action add_events(CLI::App &app) {
   auto options = std::make_shared<EventsOptions>();
   app.add_option("RESULT", options->place, "Folder of a recorded run (--out of run, simulate), or its events")
       ->required();
-  const Choices<Format> formats{
-      {"jsonl", Format::Jsonl}, {"csv", Format::Csv}, {"redag", Format::Redag}, {"perfetto", Format::Perfetto}};
-  add_choice(app, "--format", options->format, formats, "Format of the output");
+  const Choices<Format> formats{{"jsonl", Format::Jsonl},
+                                {"csv", Format::Csv},
+                                {"redag", Format::Redag},
+                                {"jobs", Format::Jobs},
+                                {"perfetto", Format::Perfetto}};
+  add_choice(app, "--format", options->format, formats, "Format of the output (jobs: jobs.csv, a row for each job)");
   app.add_option("-o,--output", options->output, "File to write; by default the text is printed")->type_name("FILE");
   return [options](Console &console) {
     const Result<void> converted = convert(*options, console);

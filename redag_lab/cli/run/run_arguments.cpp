@@ -92,6 +92,10 @@ void add_result_arguments(CLI::App &app, RunArguments &arguments) {
              "Form of the events: events.redag (compressed), or events.jsonl (text)")
       ->needs(folder)
       ->group(kResultGroup);
+  const Choices<bool> writes{{"always", true}, {"never", false}};
+  add_choice(app, "--jobs", arguments.jobs, writes, "Write jobs.csv, a row for each job, most of a long run's results")
+      ->needs(folder)
+      ->group(kResultGroup);
   const Choices<metrics::Picture> pictures{
       {"auto", metrics::Picture::Auto}, {"always", metrics::Picture::Always}, {"never", metrics::Picture::Never}};
   add_choice(app, "--picture", arguments.picture, pictures,
@@ -275,7 +279,10 @@ std::optional<lab::SessionOptions> session_options(const RunArguments &arguments
 }
 
 metrics::FilesOptions files_options(const RunArguments &arguments, const std::string &folder) {
-  return {.folder = folder, .events_as_text = arguments.events_as_text, .picture = arguments.picture};
+  return {.folder = folder,
+          .events_as_text = arguments.events_as_text,
+          .jobs = arguments.jobs,
+          .picture = arguments.picture};
 }
 
 lab::ProgressHook progress_hook(Progress &progress, const Workload &workload, Duration duration) {

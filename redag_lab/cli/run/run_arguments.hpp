@@ -43,6 +43,7 @@ struct RunArguments {
   bool json = false;
   std::string folder;
   bool events_as_text = false;
+  bool jobs = true;
   metrics::Picture picture = metrics::Picture::Auto;
   bool kernel = false;
   bool flight = false;  // records the run in `folder` while it runs
