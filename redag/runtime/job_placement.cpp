@@ -34,6 +34,7 @@ void JobPlacement::start(std::size_t processors) {
 // most urgent job to start. Therefore none of the threads that it wakes preempts it under the lock.
 void JobPlacement::place(const sched::Step &step, const Situation &situation, Taker *taker, TaskTable &tasks,
                          WakeUps &wake_ups) {
+  const bool have_levels = os_ && step.dispatches.size() > 1 && change_several_levels(step, tasks);
   const Dispatch *own = taker == nullptr ? nullptr : serve(*taker, step, situation, tasks);
   for (const Dispatch &dispatch : step.dispatches) {
     if (&dispatch == own) continue;
@@ -54,7 +55,7 @@ void JobPlacement::place(const sched::Step &step, const Situation &situation, Ta
           end_yield(dispatch.job, wake_ups);
         }
       }
-      if (os_) change_level(dispatch, tasks);
+      if (os_ && !have_levels) change_level(dispatch, tasks);
       continue;
     }
     TaskEntry &entry = tasks[dispatch.task];
@@ -185,16 +186,37 @@ void JobPlacement::end_yield(JobSlot job, WakeUps &wake_ups) {
   }
 }
 
-void JobPlacement::change_level(const Dispatch &dispatch, const TaskTable &tasks) {
-  if (waiting_.find(dispatch.job) != nullptr) return;  // it is told its level when it goes on
+// Started jobs get new levels together where a task or a DAG has come, gone or changed, or HI mode begins. Returns true
+// if that was done: one after the other, two threads could be in the wrong order for a moment.
+bool JobPlacement::change_several_levels(const sched::Step &step, const TaskTable &tasks) {
+  const auto changes = [](const Dispatch &dispatch) { return dispatch.kind == DispatchKind::Level; };
+  if (std::count_if(step.dispatches.begin(), step.dispatches.end(), changes) < 2) return false;
+  for (const Dispatch &dispatch : step.dispatches) {
+    if (changes(dispatch) || (dispatch.kind == DispatchKind::Resume && !needs_thread(dispatch))) {
+      static_cast<void>(set_level(dispatch, tasks));
+    }
+  }
+  follow_levels();
+  return true;
+}
+
+// Returns the thread that has the job. Null: the job waits, and is told its level when it goes on, or it runs at the
+// priority of the thread that called run_one().
+WorkerThread *JobPlacement::set_level(const Dispatch &dispatch, const TaskTable &tasks) {
+  if (waiting_.find(dispatch.job) != nullptr) return nullptr;
   const auto runs_it = [&](const WorkerThread &t) { return !t.stack.empty() && t.stack.back().slot == dispatch.job; };
-  if (runs_it(pool_.caller())) return;  // runs at its own priority
+  if (runs_it(pool_.caller())) return nullptr;
   const auto thread = std::find_if(pool_.threads().begin(), pool_.threads().end(),
                                    [&](const auto &candidate) { return runs_it(*candidate); });
   REDAG_CHECK(thread != pool_.threads().end(), "a job goes on that no thread has");
   (*thread)->level = dispatch.level;
   (*thread)->is_spared = dispatch.inherits || tasks[dispatch.task].is_high;
-  apply(priorities_.change((*thread)->index, priority_of(**thread)));
+  return thread->get();
+}
+
+void JobPlacement::change_level(const Dispatch &dispatch, const TaskTable &tasks) {
+  const WorkerThread *const thread = set_level(dispatch, tasks);
+  if (thread != nullptr) apply(priorities_.change(thread->index, priority_of(*thread)));
 }
 
 // The job of a thread is followed by this one.

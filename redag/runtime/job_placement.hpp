@@ -103,7 +103,8 @@ class JobPlacement {
   /// os: the priorities of the levels from now on, most urgent first. Threads that have jobs keep theirs until
   /// follow_levels(), or until the scheduler tells new levels.
   void set_levels(std::vector<int> priorities) { band_.given = std::move(priorities); }
-  /// os: gives the threads that have jobs the priorities of their levels, without inverting their order meanwhile.
+  /// os: gives the threads that have jobs the priorities of their levels. Meanwhile no two are in another order than
+  /// before and after. Allocates.
   void follow_levels();
   /// os: the priority of a job with this level.
   [[nodiscard]] int priority_of_level(std::uint32_t level) const { return band_.of_level(level); }
@@ -163,6 +164,8 @@ class JobPlacement {
   }
   void yield(Taker &taker);
   void end_yield(JobSlot job, WakeUps &wake_ups);
+  bool change_several_levels(const sched::Step &step, const TaskTable &tasks);
+  WorkerThread *set_level(const sched::Dispatch &dispatch, const TaskTable &tasks);
   void change_level(const sched::Dispatch &dispatch, const TaskTable &tasks);
   void set_priority_for_job(WorkerThread &thread, const Assignment &assignment);
   void move_priority(WorkerThread &thread, const Assignment &assignment);

@@ -474,6 +474,57 @@ TEST(EngineShare, OnlyJobsOfLowerCriticalityAreOrdinaryThreads) {
   EXPECT_GT(realtime, 0);
 }
 
+// Two jobs are in progress when tasks above both are added: both get lower priorities. The more urgent one was released
+// first, and is the first in the scheduler's tables.
+TEST(EngineProtocolLevels, NoPriorityIsInvertedWhileLevelsChange) {
+  int changes = 0;
+  expect_holds([&] {
+    std::array<int, 16> priorities{};  // indexed by the explorer's threads, which begin with that of the first level
+    priorities.fill(8);
+    std::optional<std::uint32_t> urgent;
+    std::optional<std::uint32_t> other;
+    runtime::on_set_priority = [&](std::uint32_t thread, int priority) {
+      priorities.at(thread) = priority;
+      if (!urgent || !other) return;
+      ++changes;
+      explored::check(priorities.at(*urgent) > priorities.at(*other), "a thread is below one of a less urgent job");
+    };
+    Countdown begun(2);
+    Countdown may_end(1);
+    Machine machine(ladder(2), {Preemption::Full, 2, 4, false, 0},
+                    {[&](const Job &) {
+                       other = explored::self();
+                       begun.count();
+                       may_end.wait();
+                       return Outcome::Finished;
+                     },
+                     [&](const Job &) {
+                       urgent = explored::self();
+                       begun.count();
+                       may_end.wait();
+                       return Outcome::Finished;
+                     }});
+    machine.start_calmly();
+    explored::calm(true);
+    machine.release(1);
+    machine.release(0);
+    begun.wait();
+    explored::settle();
+    Workload above = ladder(4);
+    for (Task &task : above.dags[0].tasks) task.priority = *task.priority + 10;
+    const runtime::Body nothing = [](const Job &) { return Outcome::Finished; };
+    machine.engine->add_dag(above.dags[0], {nothing, nothing, nothing, nothing});
+    machine.engine->resume();  // decides
+    urgent.reset();
+    other.reset();
+    explored::calm(false);
+    may_end.count();
+    machine.finish_calmly();
+  });
+  runtime::on_set_priority = nullptr;
+  EXPECT_GE(changes, 2);
+}
+
 // The watchdog looks while jobs begin, are preempted and end. It reports only jobs in progress, and each limit only
 // once.
 TEST_P(EngineProtocol, AWatchdogSeesOnlyJobsInProgress) {
