@@ -474,8 +474,8 @@ TEST(EngineShare, OnlyJobsOfLowerCriticalityAreOrdinaryThreads) {
   EXPECT_GT(realtime, 0);
 }
 
-// Two jobs are in progress when tasks above both are added: both get lower priorities. The more urgent one was released
-// first, and is the first in the scheduler's tables.
+// Two jobs are in progress when tasks above both are added: both get lower priorities. The more urgent one is the first
+// in the scheduler's tables.
 TEST(EngineProtocolLevels, NoPriorityIsInvertedWhileLevelsChange) {
   int changes = 0;
   expect_holds([&] {
@@ -491,23 +491,25 @@ TEST(EngineProtocolLevels, NoPriorityIsInvertedWhileLevelsChange) {
     };
     Countdown begun(2);
     Countdown may_end(1);
-    Machine machine(ladder(2), {Preemption::Full, 2, 4, false, 0},
+    Workload workload = ladder(2);
+    std::swap(workload.dags[0].tasks[0].priority, workload.dags[0].tasks[1].priority);
+    Machine machine(workload, {Preemption::Full, 2, 4, false, 0},
                     {[&](const Job &) {
-                       other = explored::self();
+                       urgent = explored::self();
                        begun.count();
                        may_end.wait();
                        return Outcome::Finished;
                      },
                      [&](const Job &) {
-                       urgent = explored::self();
+                       other = explored::self();
                        begun.count();
                        may_end.wait();
                        return Outcome::Finished;
                      }});
     machine.start_calmly();
     explored::calm(true);
-    machine.release(1);
     machine.release(0);
+    machine.release(1);
     begun.wait();
     explored::settle();
     Workload above = ladder(4);
