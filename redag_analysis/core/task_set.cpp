@@ -24,6 +24,7 @@ class Compiler {
   Compiler(const Workload &workload, const AnalysisPlatform &platform)
       : workload_(workload), waits_(waiting_times(workload)) {
     task_set_.platform = platform;
+    task_set_.devices = workload.platform.devices;
     task_set_.policy = workload.policy;
     task_set_.ties = workload.ties;
     task_set_.mode = platform.preemption;
@@ -46,13 +47,13 @@ class Compiler {
       form_units(d);
     }
     for (const CompiledTask &task : task_set_.tasks) {
-      task_set_.utilization += static_cast<double>(task.wcet) / static_cast<double>(task.period);
+      task_set_.utilization += static_cast<double>(task.wcet - task.waits) / static_cast<double>(task.period);
     }
     check_sums();
     check_threads();
     if (lost_.per_second >= kSecond) refuse("stalls, releases and preemptions leave no processor time");
-    task_set_.has_modes = task_set_.not_analysable.empty() && !modes_.empty();
-    if (task_set_.has_modes) refuse(std::move(modes_));
+    task_set_.has_modes = task_set_.not_analysable.empty() && !modes_.empty() && waits_.empty();
+    if (!modes_.empty()) refuse(std::move(modes_));
     if (!waits_.empty()) {
       refuse(why_waits_are_not_covered(task_set_));
       task_set_.has_waits = task_set_.not_analysable.empty();
@@ -162,7 +163,11 @@ class Compiler {
     compiled.wcet = lengthened(add(task.wcet, overhead));
     compiled.overhead = compiled.wcet - task.wcet;
     if (!waits_.empty()) {
-      compiled.waits = waits_[task_set_.tasks.size()];
+      const WaitingTime &waiting = waits_[task_set_.tasks.size()];
+      compiled.devices = waiting.devices;
+      compiled.elsewhere = waiting.elsewhere;
+      compiled.wake_ups = static_cast<std::uint32_t>(task.waits.size());
+      compiled.waits = waiting.total();
       compiled.wcet = add(compiled.wcet, compiled.waits);
     }
     compiled.wcet_low = task.wcet_low > 0 ? lengthened(add(task.wcet_low, overhead)) : compiled.wcet;
@@ -366,7 +371,7 @@ class Compiler {
 
   std::string modes_;  // why there is a HI mode
   const Workload &workload_;
-  const std::vector<Duration> waits_;  // by TaskId; empty: no task waits
+  const std::vector<WaitingTime> waits_;  // by TaskId; empty: no task waits
   TaskSet task_set_;
   Loss lost_;
   std::map<std::string, std::uint32_t> group_ids_;
