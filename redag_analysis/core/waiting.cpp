@@ -63,16 +63,11 @@ std::vector<WaitingTime> waiting_times(const Workload &workload) {
 }
 
 std::string why_waits_are_not_covered(const TaskSet &task_set) {
-  AnalysisPlatform plain = task_set.platform;
-  plain.workers = 1;
-  plain.preemption = sched::Preemption::Full;
-  plain.levels = plain.max_started = 0;
   if (task_set.mode == sched::Preemption::Cooperative)
     return "waits are covered without cooperative preemption points only";
   if (!task_set.groups.empty()) return "a job that waits holds its group, for which no bound is known";
   if (task_set.platform.levels > 0 || task_set.platform.max_started > 0)
     return "waits are covered without bounds on levels or threads only";
-  if (plain != AnalysisPlatform{}) return "waits are covered on a platform without overheads only";
   if (task_set.has_rate_edges()) return "waits are covered without edges between rates only";
   for (const CompiledDag &dag : task_set.dags) {
     if (dag.max_active > 0 && dag.units.size() > 1)

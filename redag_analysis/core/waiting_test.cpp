@@ -99,9 +99,6 @@ void expect_uncovered(const Workload &workload, const AnalysisPlatform &platform
 TEST(WaitingTimes, AreNotCoveredWhereNoProofIsKnown) {
   const AnalysisPlatform one = platform_of(three());
   AnalysisPlatform other = one;
-  other.preempt_overhead = 1;
-  expect_uncovered(three(), other, "waits are covered on a platform without overheads only");
-  other = one;
   other.levels = 2;
   expect_uncovered(three(), other, "waits are covered without bounds on levels or threads only");
   Workload workload = three();

@@ -79,7 +79,7 @@ Method suspension_aware() {
       .assumptions =
           "tasks that wait, m workers, full preemption or none, static priorities that keep DAGs together, one rate per "
           "DAG, R <= T; release jitter, equal priorities, max_active of DAGs in one part, devices of either queue; no "
-          "shared groups, no overheads",
+          "shared groups",
       .complexity = "pseudo-polynomial; O(DAGs * devices) per step",
       .knows_waits = true,
       .apply = bound_in_order,
@@ -96,7 +96,7 @@ Method suspension_aware_any() {
       .assumptions =
           "tasks that wait, m workers, full preemption or none, any work-conserving order (EDF, FIFO, interleaved "
           "priorities), one rate per DAG, R <= T for all; release jitter, max_active of DAGs in one part, devices of "
-          "either queue; no shared groups, no overheads",
+          "either queue; no shared groups",
       .complexity = "pseudo-polynomial; O(DAGs^2 * devices) per step, at most 1000 rounds",
       .knows_waits = true,
       .apply = bound_in_any_order,

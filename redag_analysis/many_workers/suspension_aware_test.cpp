@@ -29,7 +29,7 @@ BoundCaseLimits tasks(sched::Preemption preemption) {
   BoundCaseLimits limits;
   limits.preemption = preemption;
   limits.max_workers = 3;
-  limits.jitter = true;
+  limits.jitter = limits.overheads = true;
   limits.min_utilization = 0.1;
   limits.max_utilization = 0.6;
   limits.min_period = 10;
@@ -246,7 +246,7 @@ TEST(SuspensionAware, IsMostlyBelowTheObliviousBoundAndNotAlways) {
   double ratios = 0;
   BoundCaseLimits limits = tasks(sched::Preemption::Full);
   limits.max_workers = 1;
-  limits.jitter = false;
+  limits.jitter = limits.overheads = false;
   const auto check = [&](const BoundCase &, const TaskSet &task_set, Rng &) {
     if (!task_set.has_waits) return;
     const Outcome first = suspension_aware().apply(task_set);
