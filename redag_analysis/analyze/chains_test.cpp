@@ -133,7 +133,8 @@ void check_chain(const testing::BoundCase &bound_case, const Method &method, Rng
     const std::uint64_t seed = rng();
     sim::Options options;
     options.demand = [seed, run](const Task &task, TaskId task_id, std::uint32_t number) {
-      return run % 2 == 0 ? task.wcet : Rng::stream(seed, task_id.value, number).uniform(shortest_demand(task), task.wcet);
+      return run % 2 == 0 ? task.wcet
+                          : Rng::stream(seed, task_id.value, number).uniform(shortest_demand(task), task.wcet);
     };
     options.overheads = {bound_case.platform.release_overhead, bound_case.platform.dispatch_overhead, 0};
     const Schedule schedule = simulated(workload, bound_case.platform, 15 * longest, options);

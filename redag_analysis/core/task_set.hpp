@@ -88,7 +88,7 @@ struct CompiledTask {
   std::vector<DeviceUse> devices;  // by DeviceId; empty if no task waits
   Duration elsewhere = 0;          // waits without a device
   std::uint32_t wake_ups = 0;      // the number of its waits
-  Duration period = 0;    // T, least distance of two nominal releases of the unit
+  Duration period = 0;             // T, least distance of two nominal releases of the unit
   Duration offset = 0;    // a timer's own; a data task's is that of its grid (see Unit). Bounds of units without rate
                           // edges hold for all offsets
   Duration deadline = 0;  // D, from the task's own release

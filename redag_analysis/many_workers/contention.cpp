@@ -78,9 +78,8 @@ void Contention::find_demands(GlobalUnit &unit) {
     // While its max_active is reached, each end of a job can let less urgent ones start before the next one does.
     const bool can_lose_its_turn = cap > 0 && r == 0 && !resources_[r].is_instant;
     demand.requests = cap > 0 ? requests + (can_lose_its_turn ? unit.tasks : 0)
-                              : static_cast<std::uint32_t>(longest([&](std::uint32_t t) {
-                                  return static_cast<Duration>(uses_[t][r].requests);
-                                }));
+                              : static_cast<std::uint32_t>(longest(
+                                    [&](std::uint32_t t) { return static_cast<Duration>(uses_[t][r].requests); }));
     demand.work.period = unit.period;
     const std::uint32_t width = std::min(resources_[r].servers, cap > 0 ? std::min(cap, demand.tasks) : demand.tasks);
     set_width(demand.work, std::max(1U, width));

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// How long the jobs of a unit wait for the workers and for devices together: the arithmetic of the bounds for tasks that
-// wait (suspension_aware.hpp). The workers and each device are resources of several servers. Not thread-safe; the fixed
-// points allocate nothing.
+// How long the jobs of a unit wait for the workers and for devices together: the arithmetic of the bounds for tasks
+// that wait (suspension_aware.hpp). The workers and each device are resources of several servers. Not thread-safe; the
+// fixed points allocate nothing.
 #pragma once
 
 #include <optional>

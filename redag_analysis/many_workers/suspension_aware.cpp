@@ -59,9 +59,8 @@ Outcome bound_in_any_order(const TaskSet &task_set) {
   return global::all_that_agree(
       task_set, units, "a DAG's response time can exceed its limit, on which the bounds of all others rely",
       [&](std::size_t k) {
-        return as_last(k, [&](std::size_t last) {
-          return contention.respond(last, units[last].response - units[last].jitter);
-        });
+        return as_last(
+            k, [&](std::size_t last) { return contention.respond(last, units[last].response - units[last].jitter); });
       },
       [&](std::size_t k) { return as_last(k, [&](std::size_t last) { return contention.explain(last); }); });
 }
@@ -77,7 +76,8 @@ Method suspension_aware() {
           "et al., ECRTS 2015, and W.-H. Huang, J.-J. Chen, H. Zhou, C. Liu, PASS: priority assignment of real-time "
           "tasks with dynamic suspending behavior under fixed-priority scheduling, DAC 2015",
       .assumptions =
-          "tasks that wait, m workers, full preemption or none, static priorities that keep DAGs together, one rate per "
+          "tasks that wait, m workers, full preemption or none, static priorities that keep DAGs together, one rate "
+          "per "
           "DAG, R <= T; release jitter, equal priorities, max_active of DAGs in one part, devices of either queue; no "
           "shared groups",
       .complexity = "pseudo-polynomial; O(DAGs * devices) per step",

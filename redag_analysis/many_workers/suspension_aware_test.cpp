@@ -166,8 +166,8 @@ TEST(SuspensionAware, TwoSlotsAndTwoWorkersAreBusyTogetherBeforeAJobWaits) {
 TEST(SuspensionAware, CarriesWorkThatAWaitHasPutOff) {
   // A job of `hi` can execute at the end of its response of 9 and the next at once: 4 jobs in a window that begins
   // there. Without its wait 2 would do.
-  Workload workload = testing::make_workload({tick_dag("a", {{"hi", 10, 4}}), tick_dag("b", {{"lo", 40, 8}})}, 1,
-                                             PreemptionMode::Auto);
+  Workload workload =
+      testing::make_workload({tick_dag("a", {{"hi", 10, 4}}), tick_dag("b", {{"lo", 40, 8}})}, 1, PreemptionMode::Auto);
   workload.dags[0].tasks[0].waits = {Wait{1, 5, 0, {}}};
   EXPECT_EQ(responses(workload), (Responses{9, 8 + 3 * 4}));
   workload.dags[0].tasks[0].waits.clear();
@@ -263,8 +263,8 @@ TEST(SuspensionAware, IsMostlyBelowTheObliviousBoundAndNotAlways) {
     }
   };
   testing::for_cases(with_waits(limits), static_cast<std::uint32_t>(testing::how_many(1000)), check);
-  fmt::print("[ figures  ] suspension_aware below rta_preemptive: {}, above: {}; both bound {}, mean ratio {:.3f}\n", aware,
-             oblivious, both, ratios / static_cast<double>(both));
+  fmt::print("[ figures  ] suspension_aware below rta_preemptive: {}, above: {}; both bound {}, mean ratio {:.3f}\n",
+             aware, oblivious, both, ratios / static_cast<double>(both));
   EXPECT_GT(aware, 5 * oblivious);
   EXPECT_GT(oblivious, 0U);
 }

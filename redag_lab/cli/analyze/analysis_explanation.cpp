@@ -141,8 +141,8 @@ std::string explain_absence(const lab::Analysed &analysed, const lab::Row &row) 
     Duration executes = unit.volume;
     for (const std::uint32_t t : unit.tasks) executes -= analysed.task_set.tasks[t].waits;
     loads.emplace_back(share(executes, unit.period), unit.tasks.size() > 1
-                                                            ? analysed.task_set.dags[unit.dag.value].name
-                                                            : task_name(analysed, TaskId(unit.tasks.front())));
+                                                         ? analysed.task_set.dags[unit.dag.value].name
+                                                         : task_name(analysed, TaskId(unit.tasks.front())));
   }
   std::stable_sort(loads.begin(), loads.end(), [](const auto &a, const auto &b) { return a.first > b.first; });
   constexpr std::size_t kMost = 3;
