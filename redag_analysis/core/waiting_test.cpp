@@ -100,7 +100,13 @@ TEST(WaitingTimes, AreNotCoveredWhereNoProofIsKnown) {
   const AnalysisPlatform one = platform_of(three());
   AnalysisPlatform other = one;
   other.levels = 2;
-  expect_uncovered(three(), other, "waits are covered without bounds on levels or threads only");
+  expect_uncovered(three(), other, "waits are covered where tasks of different priority have different levels only");
+  other.levels = 8;
+  EXPECT_TRUE(compiled(three(), other).has_waits);
+  other.max_started = 4;
+  EXPECT_TRUE(compiled(three(), other).has_waits);
+  other.max_started = 3;
+  expect_uncovered(three(), other, "waits are covered with as many threads as tasks only");
   Workload workload = three();
   workload.dags[0].tasks[0].region = 1;
   other = one;
