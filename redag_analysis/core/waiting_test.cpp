@@ -105,9 +105,13 @@ TEST(WaitingTimes, AreNotCoveredWhereNoProofIsKnown) {
   EXPECT_TRUE(compiled(three(), other).has_waits);
   other.max_started = 4;
   EXPECT_TRUE(compiled(three(), other).has_waits);
-  other.max_started = 3;
-  expect_uncovered(three(), other, "waits are covered with as many threads as tasks only");
-  Workload workload = three();
+  Workload workload = testing::make_workload({testing::tick_dag("a", {{"first", 100, 4, {}}, {"then", 100, 2, {0}}})}, 1,
+                                             PreemptionMode::Auto);
+  workload.dags[0].tasks[0].waits = {Wait{1, 5, 0, {}}};
+  other = platform_of(workload);
+  other.max_started = 1;
+  expect_uncovered(workload, other, "waits are covered with as many threads as tasks only");
+  workload = three();
   workload.dags[0].tasks[0].region = 1;
   other = one;
   other.preemption = sched::Preemption::Cooperative;
