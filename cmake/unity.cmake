@@ -25,6 +25,7 @@ set(alone
   redag_analysis/many_workers/global_edf.cpp
   redag_analysis/many_workers/global_sequential.cpp
   redag_analysis/many_workers/global_sequential_test.cpp
+  redag_analysis/many_workers/suspension_aware_test.cpp
   redag_analysis/metrics/deadline_watch_test.cpp
   redag_analysis/metrics/jobs_test.cpp
   redag_analysis/metrics/perfetto_test.cpp

@@ -335,7 +335,7 @@ void for_cases(const BoundGenerator &generator, std::uint32_t count,
     const auto task_set = analysis::compile(bound_case.workload, bound_case.platform);
     SCOPED_TRACE(describe(bound_case));
     ASSERT_TRUE(task_set);
-    if (task_set->not_analysable.empty()) check(bound_case, *task_set, rng);
+    if (task_set->not_analysable.empty() || task_set->has_waits) check(bound_case, *task_set, rng);
     if (::testing::Test::HasFailure()) return;
   }
 }

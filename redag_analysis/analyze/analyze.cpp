@@ -112,7 +112,7 @@ ResponseBound itemised(const TaskSet &task_set, const Tightest &tightest, DagId 
 Bound tightest_of(const Report &report) { return combine(report.tasks, report.dags); }
 
 bool is_shown_schedulable(const TaskSet &task_set) {
-  if (!task_set.not_analysable.empty()) return false;
+  if (!task_set.not_analysable.empty() && !task_set.has_waits) return false;
   Effort::Limits limits;
   limits.steps = kUsualEffort;
   limits.itemised.which = Itemised::Which::None;

@@ -29,13 +29,13 @@ const ResponseBound *response_of(const TaskSet &task_set, TaskId task, const Bou
 }
 
 // True if a job of `from` that is released no later than one of `to` always ends before that one starts. It must be
-// ready when released, only its priority may decide, and no job may run beside it.
+// ready when released, only its priority may decide, no job may run beside it, and it must not leave the worker.
 bool goes_first(const TaskSet &task_set, const ChainSegment &from, const ChainSegment &to) {
   const CompiledTask &producer = task_set.tasks[from.last.value];
   const CompiledTask &consumer = task_set.tasks[to.first.value];
   const bool alone = from.first == from.last && producer.predecessors.empty();
   return task_set.platform.workers == 1 && is_static(task_set.policy) && alone && producer.jitter == 0 &&
-         producer.group == kNoGroup && task_set.dags[producer.dag.value].max_active == 0 &&
+         producer.group == kNoGroup && producer.wake_ups == 0 && task_set.dags[producer.dag.value].max_active == 0 &&
          producer.tier < consumer.tier && task_set.mode != sched::Preemption::Cooperative;
 }
 
@@ -56,7 +56,7 @@ Duration one_worker_reaction(const TaskSet &task_set, const std::vector<ChainSeg
 std::variant<NotApplicable, ChainBound> chain_bound(const TaskSet &task_set, std::span<const TaskId> chain,
                                                     const Bound &bound) {
   if (chain.empty()) return NotApplicable{"the chain has no tasks"};
-  if (!task_set.not_analysable.empty()) return NotApplicable{task_set.not_analysable};
+  if (!task_set.not_analysable.empty() && !task_set.has_waits) return NotApplicable{task_set.not_analysable};
   if (auto reason = why_not_directly(task_set)) return NotApplicable{*reason};
   ChainBound result;
   for (std::size_t i = 0; i < chain.size(); ++i) {

@@ -128,6 +128,55 @@ TEST(ExtremeTimes, NoBoundWraps) {
   EXPECT_GT(bounded, cases_to_try() / 4);
 }
 
+// Adds devices, and to most tasks waits of any length.
+void add_any_waits(Rng &rng, Workload &workload) {
+  workload.platform.devices = {
+      {"gpu", any_of(rng, std::array{1U, 2U, 4096U}), Device::Queue::Priority},
+      {"dla", any_of(rng, std::array{1U, 3U}), Device::Queue::Fifo},
+  };
+  for (Dag &dag : workload.dags) {
+    for (Task &task : dag.tasks) {
+      if (task.wcet < 3) continue;
+      const std::int64_t count = rng.uniform(0, 2);
+      for (std::int64_t w = 1; w <= count; ++w) {
+        const DeviceId device = any_of(rng, std::array{DeviceId(), DeviceId(std::size_t{0}), DeviceId(std::size_t{1})});
+        const Duration longest = rng.uniform(0, 1) == 0 ? any_time(rng) : task.wcet;
+        task.waits.push_back(Wait{w * (task.wcet / 3), longest, 0, device});
+      }
+    }
+  }
+}
+
+TEST(ExtremeTimes, NoBoundOfTasksThatWaitWraps) {
+  std::uint64_t analysed = 0;
+  std::uint64_t bounded = 0;
+  for (std::uint64_t seed = 0; seed < cases_to_try() && !HasFailure(); ++seed) {
+    SCOPED_TRACE(seed);
+    Rng rng(seed);
+    testing::BoundCaseLimits limits = any_limits(rng);
+    limits.preemption = any_of(rng, std::array{sched::Preemption::None, sched::Preemption::Full});
+    limits.rates = limits.groups = limits.levels = limits.overheads = false;
+    testing::BoundCase drawn = random_bound_case(rng, limits);
+    stretch(rng, drawn);
+    add_any_waits(rng, drawn.workload);
+    const Result<TaskSet> task_set = compile(drawn.workload, drawn.platform);
+    if (!task_set || !task_set->has_waits) continue;
+    ++analysed;
+    const Report report = analyze(*task_set);
+    for (const MethodReport &method : report.methods) {
+      if (method.bound() == nullptr) continue;
+      expect_in_range(method.bound()->tasks, *method.method);
+      expect_in_range(method.bound()->dags, *method.method);
+      bounded += std::count_if(method.bound()->tasks.begin(), method.bound()->tasks.end(),
+                               [](const ResponseBound &bound) { return bound.response.has_value(); }) > 0
+                     ? 1U
+                     : 0U;
+    }
+  }
+  EXPECT_GT(analysed, cases_to_try() / 10);
+  EXPECT_GT(bounded, cases_to_try() / 20);
+}
+
 TEST(ExtremeTimes, WhatSaturatedIsNoBound) {
   ResponseBound bound;
   bound.response = kUnbounded - 1;

@@ -11,9 +11,11 @@
 #include "redag_analysis/many_workers/global_dag.hpp"
 #include "redag_analysis/many_workers/global_groups.hpp"
 #include "redag_analysis/many_workers/global_sequential.hpp"
+#include "redag_analysis/many_workers/suspension_aware.hpp"
 #include "redag_analysis/one_worker/response_time.hpp"
 #include "redag_testing/bound_property.hpp"
 #include "redag_testing/builders.hpp"
+#include "redag_testing/random_workloads.hpp"
 
 namespace redag::analysis {
 namespace {
@@ -87,6 +89,27 @@ TEST(Losses, SeveralWorkersGroups) {
   testing::expect_bound_holds(dag_groups(), with_losses(limits));
 }
 
+BoundGenerator with_losses_and_waits(const BoundCaseLimits &limits) {
+  return [draw = with_losses(limits)](Rng &rng) {
+    BoundCase bound_case = draw(rng);
+    testing::add_waits(rng, bound_case.workload);
+    return bound_case;
+  };
+}
+
+// Jobs also resume after their waits, and each wake-up can preempt another job.
+TEST(Losses, OfJobsThatWait) {
+  for (const std::uint32_t workers : {1U, 3U}) {
+    BoundCaseLimits limits = limits_for(workers);
+    limits.max_utilization = 0.4;
+    testing::expect_bound_holds(suspension_aware(), with_losses_and_waits(limits), {.workloads = 500});
+    limits.edges = true;
+    testing::expect_bound_holds(suspension_aware(), with_losses_and_waits(limits), {.workloads = 500});
+    testing::expect_bound_holds(suspension_aware_any(), with_losses_and_waits(limits), {.workloads = 200});
+  }
+  testing::expect_bound_holds(rta_preemptive(), with_losses_and_waits(limits_for(1)), {.workloads = 500});
+}
+
 Workload one_task() {
   Workload workload = testing::make_workload({testing::make_dag("d", {{"t", 10, 2}})});
   workload.dags[0].tasks[0].jitter = 5;
@@ -118,6 +141,19 @@ TEST(Losses, OnOneWorkerWhoPreemptsPays) {
   ASSERT_TRUE(task_set);
   EXPECT_EQ(task_set->frozen, 0);
   EXPECT_EQ(task_set->tasks[0].wcet, 2'001'000);
+}
+
+TEST(Losses, AJobThatWaitsResumesAndPreemptsOnceMore) {
+  AnalysisPlatform platform;
+  platform.preempt_overhead = 1000;
+  Workload workload = one_task();
+  workload.dags[0].tasks[0].waits = {Wait{kMillisecond, 3 * kMillisecond, 0, {}}};
+  const Result<TaskSet> task_set = compile(workload, platform);
+  ASSERT_TRUE(task_set);
+  // 4 releases, each with 2 preemptions; of 1 s these take 200 us.
+  EXPECT_EQ(task_set->frozen, 8'002) << "ceil(4 * 2 * 1000 / (1 - 200'000 / 1e9))";
+  EXPECT_EQ(task_set->tasks[0].waits, 3'000'601) << "ceil(3 ms / (1 - 200'000 / 1e9))";
+  EXPECT_EQ(task_set->tasks[0].wcet - task_set->tasks[0].waits, 2'001'401) << "ceil((2 ms + 1 us) / the same)";
 }
 
 TEST(Losses, NothingIsLeft) {

@@ -9,6 +9,7 @@
 #include "redag_analysis/many_workers/global_edf.hpp"
 #include "redag_analysis/many_workers/global_groups.hpp"
 #include "redag_analysis/many_workers/global_sequential.hpp"
+#include "redag_analysis/many_workers/suspension_aware.hpp"
 #include "redag_analysis/one_worker/amc.hpp"
 #include "redag_analysis/one_worker/edf_demand.hpp"
 #include "redag_analysis/one_worker/exact_points.hpp"
@@ -47,6 +48,9 @@ const std::vector<Method> &methods() {
       isolated(),
       dag_groups(),
       dag_any(),
+      // Tasks that wait
+      suspension_aware(),
+      suspension_aware_any(),
       // Several workers, edf
       edf_global_response(),
       edf_global_density(),

@@ -26,7 +26,7 @@ struct Term {
     Interference,  // more urgent work
     Jitter,        // the time by which the release is seen late
     Wait,          // waiting for data of predecessors of other rates; for a DAG, also the age of that data
-    Suspended,     // waits of the task or its unit without a worker, with the time in queues of devices
+    Suspended,     // waits of the task or its unit without a worker, without the time in queues of devices
     Overhead,      // the platform's overhead for this job; the terms of others include their own
     Waiting,       // waiting for workers, predecessors and releases together, where it cannot be attributed
   };
@@ -35,6 +35,7 @@ struct Term {
   DagId dag;    // the DAG that causes it, where a unit of several tasks does
   Duration amount = 0;
   std::int64_t jobs = 0;  // number of jobs that it stands for; 0 where a number has no meaning
+  DeviceId device{};      // the device whose service or queue it is; none: the workers, or no resource at all
 
   friend bool operator==(const Term &, const Term &) = default;
 };
@@ -93,7 +94,7 @@ struct Method {
   std::string_view sound_only_if{};  // what the paper's own equations need to be sound; empty: nothing more
   bool quick = false;                // its time is about linear in the tasks, so it is worth asking first
   bool knows_modes = false;          // it applies where there is a HI mode (TaskSet::has_modes)
-  bool knows_waits = false;          // it is sound where waits count as execution (TaskSet::has_waits)
+  bool knows_waits = false;          // it covers tasks that wait (TaskSet::has_waits)
   std::function<Outcome(const TaskSet &task_set)> apply{};
 
   [[nodiscard]] bool is_paper() const { return !sound_only_if.empty(); }

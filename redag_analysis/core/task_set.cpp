@@ -24,6 +24,7 @@ class Compiler {
   Compiler(const Workload &workload, const AnalysisPlatform &platform)
       : workload_(workload), waits_(waiting_times(workload)) {
     task_set_.platform = platform;
+    task_set_.devices = workload.platform.devices;
     task_set_.policy = workload.policy;
     task_set_.ties = workload.ties;
     task_set_.mode = platform.preemption;
@@ -46,13 +47,13 @@ class Compiler {
       form_units(d);
     }
     for (const CompiledTask &task : task_set_.tasks) {
-      task_set_.utilization += static_cast<double>(task.wcet) / static_cast<double>(task.period);
+      task_set_.utilization += static_cast<double>(task.wcet - task.waits) / static_cast<double>(task.period);
     }
     check_sums();
     check_threads();
     if (lost_.per_second >= kSecond) refuse("stalls, releases and preemptions leave no processor time");
-    task_set_.has_modes = task_set_.not_analysable.empty() && !modes_.empty();
-    if (task_set_.has_modes) refuse(std::move(modes_));
+    task_set_.has_modes = task_set_.not_analysable.empty() && !modes_.empty() && waits_.empty();
+    if (!modes_.empty()) refuse(std::move(modes_));
     if (!waits_.empty()) {
       refuse(why_waits_are_not_covered(task_set_));
       task_set_.has_waits = task_set_.not_analysable.empty();
@@ -67,9 +68,10 @@ class Compiler {
   }
 
   // True if preemptions count as time in which nothing runs, as stalls and the release timer do. On several workers the
-  // resumed job pays in its own time, which no interference divided by m covers.
+  // resumed job pays in its own time, which no interference divided by m covers. Where jobs wait, it can pay after the
+  // response of the job that preempted it.
   [[nodiscard]] bool preemptions_freeze() const {
-    return task_set_.platform.workers > 1 && task_set_.mode != sched::Preemption::None &&
+    return (task_set_.platform.workers > 1 || !waits_.empty()) && task_set_.mode != sched::Preemption::None &&
            task_set_.platform.preempt_overhead > 0;
   }
 
@@ -90,10 +92,10 @@ class Compiler {
       for (const Task &task : dag.tasks) {
         const Duration late = ceil_div(add(task.jitter, platform.lateness), std::max<Duration>(task.period, 1));
         if (task.activation == Activation::Timer) add_releases(platform.timer_overhead, task, late + 1);
-        // A job preempts at most once, when it becomes eligible; this includes jobs released before the window. A job
-        // that waits for its group can make the holder preempt, too.
+        // A job preempts at most once, when it becomes eligible, and once at each wake-up; this includes jobs released
+        // before the window. A job that waits for its group can make the holder preempt, too.
         const Duration waiting = task.overrun == Overrun::Queue ? task.queue_depth : 1;
-        const Duration times = task.group.empty() ? 1 : 2;
+        const Duration times = (task.group.empty() ? 1 : 2) + static_cast<Duration>(task.waits.size());
         if (preemptions_freeze()) add_releases(multiply(platform.preempt_overhead, times), task, late + waiting + 2);
       }
     }
@@ -158,11 +160,21 @@ class Compiler {
     // The job that preempts pays for the resumption; a job preempts at most once, when it starts.
     const Duration lead = add(platform.release_overhead, platform.dispatch_overhead);
     const bool pays = task_set_.mode != sched::Preemption::None && !preemptions_freeze();
-    const Duration overhead = pays ? add(lead, platform.preempt_overhead) : lead;
+    const Duration resumptions = (pays ? 1 : 0) + static_cast<Duration>(task.waits.size());  // one after each wait
+    const Duration overhead = add(lead, multiply(platform.preempt_overhead, resumptions));
     compiled.wcet = lengthened(add(task.wcet, overhead));
     compiled.overhead = compiled.wcet - task.wcet;
     if (!waits_.empty()) {
-      compiled.waits = waits_[task_set_.tasks.size()];
+      const WaitingTime &waiting = waits_[task_set_.tasks.size()];
+      // In time that counts only while no processor is stalled, and is then stretched, waits take as much longer as
+      // executions do.
+      compiled.devices = waiting.devices;
+      compiled.elsewhere = compiled.waits = lengthened(waiting.elsewhere);
+      for (DeviceUse &use : compiled.devices) {
+        for (Duration *time : {&use.service, &use.longest, &use.blocked}) *time = lengthened(*time);
+        compiled.waits = add(compiled.waits, add(use.service, use.blocked));
+      }
+      compiled.wake_ups = static_cast<std::uint32_t>(task.waits.size());
       compiled.wcet = add(compiled.wcet, compiled.waits);
     }
     compiled.wcet_low = task.wcet_low > 0 ? lengthened(add(task.wcet_low, overhead)) : compiled.wcet;
@@ -366,7 +378,7 @@ class Compiler {
 
   std::string modes_;  // why there is a HI mode
   const Workload &workload_;
-  const std::vector<Duration> waits_;  // by TaskId; empty: no task waits
+  const std::vector<WaitingTime> waits_;  // by TaskId; empty: no task waits
   TaskSet task_set_;
   Loss lost_;
   std::map<std::string, std::uint32_t> group_ids_;

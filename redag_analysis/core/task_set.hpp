@@ -65,6 +65,16 @@ struct ExecutedRun {
 
 inline constexpr std::uint32_t kNoGroup = 0xffffffff;
 
+/// What a job of one task asks of one device.
+struct DeviceUse {
+  std::uint32_t requests = 0;
+  Duration service = 0;  // of all requests together
+  Duration longest = 0;  // of one request
+  Duration blocked = 0;  // less urgent service before the requests, on one worker (waiting.hpp)
+
+  friend bool operator==(const DeviceUse &, const DeviceUse &) = default;
+};
+
 /// One per TaskId.
 struct CompiledTask {
   std::string name;  // "dag.task"
@@ -74,8 +84,11 @@ struct CompiledTask {
   Duration wcet_low = 0;  // C(LO) with overheads, while wcet is C(HI); equal to wcet if the task has no `wcet_low`
   Duration bcet = 0;      // with overheads, > 0; only the exploration reads it: bounds hold for shorter executions
   Duration overhead = 0;  // the part of `wcet` that is overhead
-  Duration waits = 0;     // the part of `wcet` in which the job needs no worker (waiting.hpp)
-  Duration period = 0;    // T, least distance of two nominal releases of the unit
+  Duration waits = 0;     // the part of `wcet` in which the job needs no worker: all of `devices`, and `elsewhere`
+  std::vector<DeviceUse> devices;  // by DeviceId; empty if no task waits
+  Duration elsewhere = 0;          // waits without a device
+  std::uint32_t wake_ups = 0;      // the number of its waits
+  Duration period = 0;             // T, least distance of two nominal releases of the unit
   Duration offset = 0;    // a timer's own; a data task's is that of its grid (see Unit). Bounds of units without rate
                           // edges hold for all offsets
   Duration deadline = 0;  // D, from the task's own release
@@ -131,7 +144,8 @@ struct TaskSet {
   std::vector<CompiledDag> dags;
   std::vector<std::uint32_t> by_rank;              // TaskIds, most urgent first
   std::vector<std::vector<std::uint32_t>> groups;  // TaskIds of each group
-  double utilization = 0;                          // sum of wcet / period, overheads included; only to be shown
+  std::vector<Device> devices;                     // of the platform
+  double utilization = 0;                          // processor time / period, overheads included; only to be shown
   /// Features that no bound covers, such as a budget below the wcet or a queue that is too small. Every method then
   /// answers NotApplicable with this reason.
   std::string not_analysable;
@@ -140,8 +154,8 @@ struct TaskSet {
   /// Some wcet_low is below its wcet: there is a HI mode, and not_analysable has no other reason. Methods that know
   /// modes (Method::knows_modes) apply.
   bool has_modes = false;
-  /// Jobs wait without a worker, and not_analysable has no other reason. Their waits count as execution, and methods
-  /// that are sound then (Method::knows_waits) apply.
+  /// Jobs wait without a worker, and not_analysable has no other reason. CompiledTask::wcet counts waits as execution,
+  /// and methods that are sound then, or that look at the waits themselves (Method::knows_waits), apply.
   bool has_waits = false;
 
   /// Time in which the machine can leave all jobs without a processor during any response time, besides the share that

@@ -12,53 +12,68 @@
 namespace redag::analysis {
 namespace {
 
-// The longest service of a job of the task at the device; 0: it never asks.
-Duration longest_service(const Task &task, DeviceId device) {
-  Duration longest = 0;
+// The waits of the task's own jobs.
+WaitingTime own_waits(const Task &task, std::size_t devices) {
+  WaitingTime time;
+  time.devices.resize(devices);
   for (const Wait &wait : task.waits) {
-    if (wait.device == device) longest = std::max(longest, wait.longest);
+    if (!wait.device.valid()) {
+      time.elsewhere = add(time.elsewhere, wait.longest);
+      continue;
+    }
+    DeviceUse &use = time.devices[wait.device.value];
+    ++use.requests;
+    use.service = add(use.service, wait.longest);
+    use.longest = std::max(use.longest, wait.longest);
   }
-  return longest;
+  return time;
 }
 
 }  // namespace
 
-std::vector<Duration> waiting_times(const Workload &workload) {
-  std::vector<Duration> times;
+Duration WaitingTime::total() const {
+  Duration sum = elsewhere;
+  for (const DeviceUse &use : devices) sum = add(sum, add(use.service, use.blocked));
+  return sum;
+}
+
+std::vector<WaitingTime> waiting_times(const Workload &workload) {
+  std::vector<WaitingTime> times;
   if (!has_waits(workload)) return times;
+  const std::vector<Device> &devices = workload.platform.devices;
+  for (const TaskRef &task : flatten(workload)) times.push_back(own_waits(*task.task, devices.size()));
   const std::vector<sched::Priority> priorities =
       sched::assign_priorities(workload.dags, workload.policy, workload.ties, 0);
-  const std::vector<TaskRef> tasks = flatten(workload);
-  for (const TaskRef &own : tasks) {
-    Duration time = 0;
-    for (const Wait &wait : own.task->waits) {
-      time = add(time, wait.longest);
-      if (!wait.device.valid()) continue;
+  for (std::size_t t = 0; t < times.size(); ++t) {
+    for (std::size_t d = 0; d < devices.size(); ++d) {
+      DeviceUse &own = times[t].devices[d];
+      if (own.requests == 0) continue;
       Duration one = 0;
       Duration all = 0;
-      for (const TaskRef &other : tasks) {
-        if (priorities[other.id.value].tier <= priorities[own.id.value].tier) continue;
-        const Duration service = longest_service(*other.task, wait.device);
+      for (std::size_t other = 0; other < times.size(); ++other) {
+        if (priorities[other].tier <= priorities[t].tier) continue;
+        const Duration service = times[other].devices[d].longest;
         one = std::max(one, service);
         all = add(all, service);
       }
-      const bool is_fifo = workload.platform.devices[wait.device.value].queue == Device::Queue::Fifo;
-      time = add(time, is_fifo ? all : one);
+      own.blocked = multiply(devices[d].queue == Device::Queue::Fifo ? all : one, own.requests);
     }
-    times.push_back(time);
   }
   return times;
 }
 
 std::string why_waits_are_not_covered(const TaskSet &task_set) {
-  const AnalysisPlatform &platform = task_set.platform;
-  if (!is_static(task_set.policy)) return "waits are covered under static priorities only";
-  if (platform.workers > 1) return "waits are covered on one worker only";
-  if (task_set.mode != sched::Preemption::Full) return "waits are covered with full preemption only";
+  if (task_set.mode == sched::Preemption::Cooperative)
+    return "waits are covered without cooperative preemption points only";
   if (!task_set.groups.empty()) return "a job that waits holds its group, for which no bound is known";
-  if (platform.levels > 0 || platform.max_started > 0)
-    return "waits are covered without bounds on levels or threads only";
-  if (!(platform == AnalysisPlatform{})) return "waits are covered on a platform without overheads only";
+  for (std::size_t rank = 1; rank < task_set.by_rank.size(); ++rank) {
+    const CompiledTask &upper = task_set.tasks[task_set.by_rank[rank - 1]];
+    const CompiledTask &lower = task_set.tasks[task_set.by_rank[rank]];
+    if (upper.level == lower.level && upper.tier != lower.tier)
+      return "waits are covered where tasks of different priority have different levels only";
+  }
+  if (task_set.platform.max_started > 0 && task_set.platform.max_started < task_set.tasks.size())
+    return "waits are covered with as many threads as tasks only";
   if (task_set.has_rate_edges()) return "waits are covered without edges between rates only";
   for (const CompiledDag &dag : task_set.dags) {
     if (dag.max_active > 0 && dag.units.size() > 1)

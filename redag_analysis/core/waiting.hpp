@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Bounds on what jobs wait for without a worker. Pure functions.
+// What jobs wait for without a worker. Pure functions.
 #pragma once
 
 #include <string>
@@ -11,15 +11,24 @@
 
 namespace redag::analysis {
 
-/// By TaskId: the longest time that a job of the task is away from its worker and no job of a more urgent or equal task
-/// is served by a device or waits without one. This is its own waits, and for each request to a device less urgent
-/// service that cannot be interrupted:
+/// The waits of one task.
+struct WaitingTime {
+  std::vector<DeviceUse> devices;  // by DeviceId
+  Duration elsewhere = 0;          // waits without a device
+
+  /// The longest time that a job is away from its worker and no job of a more urgent or equal task is served by a
+  /// device or waits without one.
+  [[nodiscard]] Duration total() const;
+};
+
+/// By TaskId: its own waits, and for each request to a device the less urgent service before it (DeviceUse::blocked),
+/// which cannot be interrupted:
 /// - `queue: priority`: one service, the longest of the less urgent tasks. It began before the request, and after it
 ///   the slot goes to the queue's first job, which is no less urgent.
 /// - `queue: fifo`: one service of each less urgent task, whose request came before. Requires tasks whose jobs do not
 ///   overlap.
 /// Empty if no task waits. Requires a valid workload.
-[[nodiscard]] std::vector<Duration> waiting_times(const Workload &workload);
+[[nodiscard]] std::vector<WaitingTime> waiting_times(const Workload &workload);
 
 /// For a task set whose tasks wait: why no bound covers their waits, or an empty text.
 [[nodiscard]] std::string why_waits_are_not_covered(const TaskSet &task_set);

@@ -59,9 +59,17 @@ Workload three(Device::Queue queue = Device::Queue::Priority) {
   return workload;
 }
 
+std::vector<Duration> totals(const Workload &workload) {
+  std::vector<Duration> times;
+  for (const WaitingTime &time : waiting_times(workload)) times.push_back(time.total());
+  return times;
+}
+
 TEST(WaitingTimes, AreOwnWaitsAndOneLessUrgentServiceForEachRequest) {
-  EXPECT_EQ(waiting_times(three()), (std::vector<Duration>{5 + 8 + 3, 0, 7 + 8, 8 + 2}));
-  EXPECT_EQ(waiting_times(three(Device::Queue::Fifo)), (std::vector<Duration>{5 + 7 + 8 + 3, 0, 7 + 8, 8 + 2}));
+  EXPECT_EQ(totals(three()), (std::vector<Duration>{5 + 8 + 3, 0, 7 + 8, 8 + 2}));
+  EXPECT_EQ(totals(three(Device::Queue::Fifo)), (std::vector<Duration>{5 + 7 + 8 + 3, 0, 7 + 8, 8 + 2}));
+  EXPECT_EQ(waiting_times(three())[3].devices, (std::vector<DeviceUse>{{2, 10, 8, 0}}));
+  EXPECT_EQ(waiting_times(three())[0].elsewhere, 3);
   EXPECT_TRUE(waiting_times(testing::independent({{1, 10}})).empty());
 }
 
@@ -71,12 +79,13 @@ TEST(WaitingTimes, CountAsExecutionInTheBound) {
   AnalyzeOptions options;
   options.itemise = true;
   const Report report = analyze(task_set, options);
-  ASSERT_TRUE(report.tasks[1].response);
-  EXPECT_EQ(*report.tasks[0].response, 4 + 16);
-  EXPECT_EQ(report.tasks[0].bound.sum(Term::Kind::Own), 4);
-  EXPECT_EQ(report.tasks[0].bound.sum(Term::Kind::Suspended), 16);
-  EXPECT_EQ(*report.tasks[1].response, 10 + 20);
-  EXPECT_EQ(*report.tasks[2].response, 6 + 15 + 20 + 10);
+  const Bound bound = std::get<Bound>(rta_preemptive().apply(task_set));
+  EXPECT_EQ(bound.tasks[0].response, 4 + 16);
+  EXPECT_EQ(bound.tasks[0].sum(Term::Kind::Own), 4);
+  EXPECT_EQ(bound.tasks[0].sum(Term::Kind::Suspended), 8);
+  EXPECT_EQ(bound.tasks[0].sum(Term::Kind::Blocking), 8);
+  EXPECT_EQ(bound.tasks[1].response, 10 + 20);
+  EXPECT_EQ(bound.tasks[2].response, 6 + 15 + 20 + 10);
   for (const MethodReport &method : report.methods) EXPECT_TRUE(!method.trusted || method.method->knows_waits);
 }
 
@@ -90,20 +99,23 @@ void expect_uncovered(const Workload &workload, const AnalysisPlatform &platform
 TEST(WaitingTimes, AreNotCoveredWhereNoProofIsKnown) {
   const AnalysisPlatform one = platform_of(three());
   AnalysisPlatform other = one;
-  other.workers = 2;
-  expect_uncovered(three(), other, "waits are covered on one worker only");
-  other = one;
-  other.preemption = sched::Preemption::None;
-  expect_uncovered(three(), other, "waits are covered with full preemption only");
-  other = one;
-  other.preempt_overhead = 1;
-  expect_uncovered(three(), other, "waits are covered on a platform without overheads only");
-  other = one;
   other.levels = 2;
-  expect_uncovered(three(), other, "waits are covered without bounds on levels or threads only");
-  Workload workload = three();
-  workload.policy = PolicyKind::Edf;
-  expect_uncovered(workload, one, "waits are covered under static priorities only");
+  expect_uncovered(three(), other, "waits are covered where tasks of different priority have different levels only");
+  other.levels = 8;
+  EXPECT_TRUE(compiled(three(), other).has_waits);
+  other.max_started = 4;
+  EXPECT_TRUE(compiled(three(), other).has_waits);
+  Workload workload = testing::make_workload({testing::tick_dag("a", {{"first", 100, 4, {}}, {"then", 100, 2, {0}}})}, 1,
+                                             PreemptionMode::Auto);
+  workload.dags[0].tasks[0].waits = {Wait{1, 5, 0, {}}};
+  other = platform_of(workload);
+  other.max_started = 1;
+  expect_uncovered(workload, other, "waits are covered with as many threads as tasks only");
+  workload = three();
+  workload.dags[0].tasks[0].region = 1;
+  other = one;
+  other.preemption = sched::Preemption::Cooperative;
+  expect_uncovered(workload, other, "waits are covered without cooperative preemption points only");
   workload = three();
   workload.dags[0].tasks[0].group = workload.dags[1].tasks[0].group = "g";
   expect_uncovered(workload, one, "a job that waits holds its group, for which no bound is known");

@@ -177,7 +177,7 @@ void SharedTerms::push(Term::Kind kind, const GlobalUnit &whose, Duration amount
   if (!wanted_) return;
   const Unit &unit = task_set_.units[whose.unit];
   const TaskId task = unit.tasks.size() == 1 ? TaskId(unit.tasks.front()) : TaskId();
-  terms_.push_back(Term{kind, task, unit.dag, amount, jobs});
+  terms_.push_back(Term{kind, task, unit.dag, amount, jobs, device_});
 }
 
 void SharedTerms::add_path() {
@@ -199,12 +199,21 @@ void SharedTerms::add(const Term &term) {
 
 void SharedTerms::add_share(Term::Kind kind, const GlobalUnit &whose, Duration numerator, Duration denominator,
                             std::int64_t jobs) {
+  const Duration whole = take_share(numerator, denominator);
+  if (numerator != 0) push(kind, whose, whole, jobs);
+}
+
+void SharedTerms::add_blocking(Duration numerator, Duration denominator) {
+  const Duration whole = take_share(numerator, denominator);
+  if (wanted_ && numerator != 0) terms_.push_back(Term{Term::Kind::Blocking, {}, {}, whole, 0, device_});
+}
+
+Duration SharedTerms::take_share(Duration numerator, Duration denominator) {
   if (denominator_ == 1) denominator_ = denominator;  // no remainder so far
   if (denominator == denominator_) {
     const Duration sum = remainder_ + numerator;
     remainder_ = sum % denominator;
-    if (numerator != 0) push(kind, whose, sum / denominator, jobs);
-    return;
+    return sum / denominator;
   }
   const Int128 common = Int128{denominator_} * denominator;
   const Int128 sum = Int128{remainder_} * denominator + Int128{numerator} * denominator_;
@@ -214,7 +223,7 @@ void SharedTerms::add_share(Term::Kind kind, const GlobalUnit &whose, Duration n
   const Duration divisor = std::gcd(rest, static_cast<Duration>(common));
   remainder_ = rest / divisor;
   denominator_ = static_cast<Duration>(common) / divisor;
-  if (numerator != 0) push(kind, whose, whole, jobs);
+  return whole;
 }
 
 Duration largest_remaining(const TaskSet &task_set, const std::vector<GlobalUnit> &units, std::size_t from,

@@ -114,16 +114,23 @@ class SharedTerms {
   /// Adds `numerator` / `denominator`. The sum of all shares so far is rounded down once.
   void add_share(Term::Kind kind, const GlobalUnit &whose, Duration numerator, Duration denominator,
                  std::int64_t jobs = 0);
+  /// Adds a share of less urgent work that no single unit causes.
+  void add_blocking(Duration numerator, Duration denominator);
+  /// The terms that follow are those of a device, until at() with none. The first ones are of no device.
+  void at(DeviceId device) { device_ = device; }
   [[nodiscard]] std::vector<Term> take() { return std::move(terms_); }
   [[nodiscard]] bool wanted() const { return wanted_; }
 
  private:
   void push(Term::Kind kind, const GlobalUnit &whose, Duration amount, std::int64_t jobs);
+  // Returns what this share adds to the sum of all shares, rounded down.
+  [[nodiscard]] Duration take_share(Duration numerator, Duration denominator);
 
   const TaskSet &task_set_;
   const GlobalUnit &unit_;
   bool wanted_;
   std::vector<Term> terms_;
+  DeviceId device_;
   Duration remainder_ = 0;
   Duration denominator_ = 1;
 };

@@ -14,9 +14,6 @@ namespace redag::analysis {
 namespace global {
 namespace {
 
-// How many times the waiting time of one window is tightened; every round gives a valid one.
-constexpr int kRounds = 8;
-
 // floor(a / b + c / d) for small divisors.
 Duration floor_of_sum(Duration a, Duration b, Duration c, Duration d) {
   return a / b + c / d + (a % b * d + c % d * b) / (b * d);

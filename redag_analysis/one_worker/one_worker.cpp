@@ -51,6 +51,22 @@ Duration stop_of(const Own &own, std::int64_t q) {
   return saturate(Int128{own.limit} - own.jitter + Int128{q} * own.period);
 }
 
+// Adds the unit's own waits, and the less urgent service before them.
+void add_waits(const TaskSet &task_set, const Unit &unit, TaskId self, std::vector<Term> &terms) {
+  Duration elsewhere = 0;
+  for (const std::uint32_t t : unit.tasks) elsewhere = add(elsewhere, task_set.tasks[t].elsewhere);
+  if (elsewhere > 0) terms.push_back(Term{Term::Kind::Suspended, self, unit.dag, elsewhere, 0});
+  for (std::size_t d = 0; d < task_set.devices.size(); ++d) {
+    DeviceUse use;
+    for (const std::uint32_t t : unit.tasks) {
+      use.service = add(use.service, task_set.tasks[t].devices[d].service);
+      use.blocked = add(use.blocked, task_set.tasks[t].devices[d].blocked);
+    }
+    if (use.service > 0) terms.push_back(Term{Term::Kind::Suspended, self, unit.dag, use.service, 0, DeviceId(d)});
+    if (use.blocked > 0) terms.push_back(Term{Term::Kind::Blocking, {}, {}, use.blocked, 0, DeviceId(d)});
+  }
+}
+
 std::vector<Term> terms_of(const TaskSet &task_set, const Unit &unit, const View &view,
                            const std::vector<std::uint32_t> &more_urgent, const Response &response, bool deferred) {
   Duration overhead = 0;
@@ -62,7 +78,7 @@ std::vector<Term> terms_of(const TaskSet &task_set, const Unit &unit, const View
   std::vector<Term> terms;
   const TaskId self = unit.tasks.size() == 1 ? TaskId(unit.tasks.front()) : TaskId();
   terms.push_back(Term{Term::Kind::Own, self, unit.dag, unit.volume - overhead - waits, 1});
-  if (waits > 0) terms.push_back(Term{Term::Kind::Suspended, self, unit.dag, waits, 0});
+  if (waits > 0) add_waits(task_set, unit, self, terms);
   if (overhead > 0) terms.push_back(Term{Term::Kind::Overhead, self, unit.dag, overhead, 0});
   if (response.job > 0) {
     const Duration earlier = response.job * (unit.volume - unit.period);

@@ -151,6 +151,9 @@ std::vector<analysis::Term> terms_of(const Analysed &analysed, const Row &row) {
 }
 
 std::string task_name(const Analysed &analysed, TaskId task) { return analysed.task_set.tasks[task.value].name; }
+std::string device_name(const Analysed &analysed, DeviceId device) {
+  return analysed.task_set.devices[device.value].name;
+}
 
 std::vector<Row> task_rows(const Analysed &analysed) {
   std::vector<Row> rows;
@@ -220,7 +223,8 @@ std::vector<TaskId> suspects_of(const Analysed &analysed, const Row &row) {
   }
   std::vector<std::uint32_t> others = task_set.by_rank;
   const auto load = [&](std::uint32_t t) {
-    return static_cast<double>(task_set.tasks[t].wcet) / static_cast<double>(task_set.tasks[t].period);
+    const analysis::CompiledTask &task = task_set.tasks[t];
+    return static_cast<double>(task.wcet - task.waits) / static_cast<double>(task.period);
   };
   std::stable_sort(others.begin(), others.end(), [&](auto a, auto b) { return load(a) > load(b); });
   for (const std::uint32_t t : others) add(t);

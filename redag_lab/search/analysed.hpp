@@ -86,6 +86,7 @@ struct Row {
 
 /// Returns "dag.task".
 [[nodiscard]] std::string task_name(const Analysed &analysed, TaskId task);
+[[nodiscard]] std::string device_name(const Analysed &analysed, DeviceId device);
 
 /// Returns the row with the least slack for its deadline, or without a bound. Returns nothing if a test accepts all
 /// tasks without numbers.

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "redag/base/check.hpp"
+#include "redag/model/waits.hpp"
 #include "redag_analysis/core/arithmetic.hpp"
 
 namespace redag::lab {
@@ -20,8 +21,12 @@ Duration scaled_down(Duration value, std::int64_t numerator, std::int64_t denomi
 }
 
 // Scales the execution times by `numerator` / `denominator`. The wcet becomes exactly `wcet`, which also caps the
-// others.
+// others, but leaves 1 ns for each stretch between waits. The waits keep their lengths.
 void scale_execution(Task &task, Duration wcet, std::int64_t numerator, std::int64_t denominator) {
+  wcet = std::max(wcet, shortest_demand(task));
+  std::vector<Duration> points;
+  for (std::size_t w = 0; w < task.waits.size(); ++w) points.push_back(wait_point(task, w, wcet));
+  for (std::size_t w = 0; w < task.waits.size(); ++w) task.waits[w].after = points[w];
   task.wcet = wcet;
   task.bcet = std::min(wcet, scaled_down(task.bcet, numerator, denominator));
   if (task.region > 0) task.region = scaled_up(task.region, numerator, denominator);

@@ -24,7 +24,9 @@ constexpr Duration kLongestPeriod = 86'400 * kSecond;  // and to at most this le
 bool is_overloaded(const analysis::TaskSet &task_set) {
   constexpr unsigned kBits = 40;
   Int128 sum = 0;
-  for (const analysis::CompiledTask &task : task_set.tasks) sum += (Int128{task.wcet} << kBits) / task.period;
+  for (const analysis::CompiledTask &task : task_set.tasks) {
+    sum += (Int128{task.wcet - task.waits} << kBits) / task.period;
+  }
   return sum > Int128{task_set.platform.workers} << kBits;
 }
 
@@ -41,7 +43,7 @@ std::string why_no_bound(const analysis::Report &report, std::uint32_t task) {
 std::string obstacle_of(const Workload &workload, const analysis::AnalysisPlatform &platform) {
   const Result<analysis::TaskSet> task_set = analysis::compile(workload, platform);
   if (!task_set) return task_set.error().front().message;
-  if (!task_set->not_analysable.empty()) return task_set->not_analysable;
+  if (!task_set->not_analysable.empty() && !task_set->has_waits) return task_set->not_analysable;
   if (const std::optional<std::string> why = why_impossible(*task_set)) return *why;
   const analysis::Report report = analysis::analyze(*task_set);
   std::optional<std::uint32_t> worst;
@@ -263,8 +265,11 @@ std::optional<std::string> why_impossible(const analysis::TaskSet &task_set) {
   for (std::uint32_t t = 0; t < task_set.tasks.size(); ++t) {
     const analysis::CompiledTask &task = task_set.tasks[t];
     // Jobs of a task that can overlap (concurrency) may take longer than the limit; such workloads are not analysed.
-    const Duration due = task_set.not_analysable.empty() ? std::min(task.deadline, task.limit) : task.deadline;
-    if (task.wcet > due) return task.name + " alone takes longer than its deadline allows";
+    const bool is_analysed = task_set.not_analysable.empty() || task_set.has_waits;
+    const Duration due = is_analysed ? std::min(task.deadline, task.limit) : task.deadline;
+    Duration alone = task.wcet;
+    for (const analysis::DeviceUse &use : task.devices) alone -= use.blocked;
+    if (alone > due) return task.name + " alone takes longer than its deadline allows";
   }
   if (is_overloaded(task_set)) return fmt::format("the utilization exceeds {}", task_set.platform.workers);
   return std::nullopt;

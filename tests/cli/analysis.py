@@ -468,9 +468,6 @@ dags:
             tuned = self.folder / "tuned.yaml"
             fewer = [] if file.name == "clusters.yaml" else ["--exhaustive", "50"]
             result = redag("assign", file, "--preemption", "none", *fewer, "-o", tuned)
-            if file.name == "perception.yaml":
-                self.expect(result, 2, "task 'detect' has segments, which cannot be handled here")
-                continue
             self.expect(result, 0)
             self.expect(redag("validate", tuned), 0)
         text = self.expect(redag("assign", SOURCE / "workloads" / "robot.yaml", "--preemption", "cooperative"), 0).stdout

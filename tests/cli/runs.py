@@ -209,11 +209,33 @@ class Waits(Case):
         one = self.write("one.yaml", self.FILE.read_text().replace("workers: 2", "workers: 1"))
         self.expect(redag("analyze", one, "--check"), 0)
         explained = self.expect(redag("analyze", one, "--explain", "camera.detect"), 0)
-        self.assertIn("waits without a worker", explained.stdout)
-        self.assertIn("on one worker only", self.expect(redag("analyze", self.FILE), 0).stdout)
+        for line in "service at gpu", "blocking at gpu by", "less urgent work", "own execution":
+            self.assertIn(line, explained.stdout)
+        # Waits of more urgent tasks are no execution of theirs, so the second bound is the smaller one.
+        self.assertIn("suspension_aware", explained.stdout)
+        oblivious = ["--method", "rta_preemptive", "--method", "dag_one_worker_preemptive"]
+        self.expect(redag("analyze", one, "--check", *oblivious), 0)
         # A device that serves in the order of requests lets each less urgent task go first.
         fifo = self.write("fifo.yaml", one.read_text().replace("queue: priority", "queue: fifo"))
-        self.expect(redag("analyze", fifo, "--check"), 1)
+        self.expect(redag("analyze", fifo, "--check", *oblivious), 1)
+        self.assertIn("queue: priority", self.expect(redag("analyze", fifo, "--explain", "camera.detect"), 0).stdout)
+
+    def test_bounded_on_several_workers(self):
+        self.expect(redag("analyze", self.FILE, "--check"), 0)
+        self.expect(redag("analyze", self.FILE, "--check", "--preemption", "none"), 0)
+        document = json.loads(redag("analyze", self.FILE, "--json").stdout)
+        terms = next(dag["terms"] for dag in document["dags"] if dag["name"] == "map")
+        self.assertEqual({term["device"] for term in terms}, {None, "gpu"})
+
+    def test_tuned_and_assigned(self):
+        tuned = self.folder / "tuned.yaml"
+        for command in (["tune", "--seeds", "2", "--duration", "1s"], ["assign", "--exhaustive", "20"]):
+            with self.subTest(command=command):
+                self.expect(redag(command[0], self.FILE, *command[1:], "-o", tuned), 0)
+                self.expect(redag("validate", tuned), 0)
+                self.assertIn("device: gpu", tuned.read_text())
+        margins = self.expect(redag("sensitivity", self.FILE), 0).stdout
+        self.assertIn("lidar.segment", margins)
 
     def test_run_on_threads_and_checked(self):
         for mode in "none", "cooperative":
@@ -230,7 +252,7 @@ class Waits(Case):
 
     def test_others_refuse_them(self):
         where = f"{self.FILE}:{1 + self.FILE.read_text().splitlines().index(self.segments())}:"
-        for arguments in (["run", "--executor", "mte"], ["simulate", "--executor", "mte"], ["compare"], ["tune"], ["assign"], ["sensitivity"]):
+        for arguments in (["run", "--executor", "mte"], ["simulate", "--executor", "mte"], ["compare"]):
             with self.subTest(arguments=arguments):
                 self.expect(redag(arguments[0], self.FILE, *arguments[1:]), 2, where, "segments, which cannot be handled here")
 

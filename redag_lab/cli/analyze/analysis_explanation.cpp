@@ -28,16 +28,17 @@ std::string owner(const lab::Analysed &analysed, const Term &term) {
   }
 }
 
-std::string what(const Term &term) {
+std::string what(const lab::Analysed &analysed, const Term &term) {
+  const std::string at = term.device.valid() ? " at " + device_name(analysed, term.device) : "";
   switch (term.kind) {
     // Of a DAG on several workers: its longest path (one job), and the delay of this path by the DAG's other tasks.
     case Term::Kind::Own: return term.jobs == 0 ? "its other tasks, off the longest path" : "own execution";
     case Term::Kind::Earlier: return term.amount < 0 ? "time since earlier jobs were released" : "its own earlier jobs";
-    case Term::Kind::Blocking: return "blocking by";
-    case Term::Kind::Interference: return "interference by";
+    case Term::Kind::Blocking: return "blocking" + at + " by";
+    case Term::Kind::Interference: return "interference" + at + " by";
     case Term::Kind::Jitter: return "release jitter";
     case Term::Kind::Wait: return "waiting for data of other rates";
-    case Term::Kind::Suspended: return "its waits without a worker";
+    case Term::Kind::Suspended: return term.device.valid() ? "service" + at : "waits without a device";
     case Term::Kind::Overhead: return "overhead";
     case Term::Kind::Waiting: return "all waiting together";
   }
@@ -58,7 +59,23 @@ std::string advice_on_blocking(const lab::Analysed &analysed, const std::string 
   return fmt::format("{} holds a group or shares a priority level: shorten it, or take it out of the group", who);
 }
 
+std::string advice_at_device(const lab::Analysed &analysed, const Term &term) {
+  const std::string device = device_name(analysed, term.device);
+  switch (term.kind) {
+    case Term::Kind::Blocking:
+      return analysed.task_set.devices[term.device.value].queue == Device::Queue::Fifo
+                 ? fmt::format("{} serves in the order of requests: `queue: priority`, or shorter service, helps most",
+                               device)
+                 : fmt::format("{} ends a service that has begun: shorter ones of less urgent tasks help most", device);
+    case Term::Kind::Interference:
+      return fmt::format("{} is served first: shorten its service, or give {} one more slot", owner(analysed, term),
+                         device);
+    default: return fmt::format("a shorter service of its own at {} helps most", device);
+  }
+}
+
 std::string advice(const lab::Analysed &analysed, const Term &term) {
+  if (term.device.valid()) return advice_at_device(analysed, term);
   const std::string who = owner(analysed, term);
   switch (term.kind) {
     case Term::Kind::Own:
@@ -75,8 +92,7 @@ std::string advice(const lab::Analysed &analysed, const Term &term) {
     }
     case Term::Kind::Jitter: return "less release jitter helps most";
     case Term::Kind::Wait: return "a shorter period or response time of its predecessors helps most";
-    case Term::Kind::Suspended:
-      return "shorter waits, or shorter service of less urgent tasks at its devices, help most";
+    case Term::Kind::Suspended: return "a shorter wait helps most";
     case Term::Kind::Overhead: return "fewer and longer jobs, or smaller scheduling overheads, help most";
     case Term::Kind::Waiting:
       return "the exploration found its worst case among all schedules; without --explore, the bounds name the causes";
@@ -96,7 +112,7 @@ std::string explain_bound(const lab::Analysed &analysed, const lab::Row &row, co
   for (const Term &term : terms) {
     if (term.amount == 0) continue;
     const bool is_negative = term.amount < 0;
-    table.add({{what(term)},
+    table.add({{what(analysed, term)},
                {owner(analysed, term)},
                {term.jobs > 0 ? format_count(static_cast<std::uint64_t>(term.jobs)) : "-"},
                {is_negative ? "-" + humanize_duration(-term.amount) : humanize_duration(term.amount)},
@@ -122,9 +138,11 @@ std::string explain_absence(const lab::Analysed &analysed, const lab::Row &row) 
   if (!reasons.empty()) text += "methods that do not apply:\n" + reasons;
   std::vector<std::pair<double, std::string>> loads;
   for (const analysis::Unit &unit : analysed.task_set.units) {
-    loads.emplace_back(share(unit.volume, unit.period), unit.tasks.size() > 1
-                                                            ? analysed.task_set.dags[unit.dag.value].name
-                                                            : task_name(analysed, TaskId(unit.tasks.front())));
+    Duration executes = unit.volume;
+    for (const std::uint32_t t : unit.tasks) executes -= analysed.task_set.tasks[t].waits;
+    loads.emplace_back(share(executes, unit.period), unit.tasks.size() > 1
+                                                         ? analysed.task_set.dags[unit.dag.value].name
+                                                         : task_name(analysed, TaskId(unit.tasks.front())));
   }
   std::stable_sort(loads.begin(), loads.end(), [](const auto &a, const auto &b) { return a.first > b.first; });
   constexpr std::size_t kMost = 3;

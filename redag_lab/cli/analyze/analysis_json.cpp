@@ -21,7 +21,8 @@ Json terms_json(const lab::Analysed &analysed, const analysis::ResponseBound &bo
                          {"dag", term.dag.valid() ? Json(analysed.task_set.dags[term.dag.value].name) : Json()},
                          {"task", term.task.valid() ? Json(task_name(analysed, term.task)) : Json()},
                          {"amount_ns", term.amount},
-                         {"jobs", term.jobs}});
+                         {"jobs", term.jobs},
+                         {"device", term.device.valid() ? Json(device_name(analysed, term.device)) : Json()}});
   }
   return terms;
 }

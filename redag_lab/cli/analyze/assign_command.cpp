@@ -89,7 +89,7 @@ int assign_clusters(const Workload &workload, const Options &options, Console &c
 
 int assign_file(const Options &options, Console &console) {
   const std::optional<Workload> workload =
-      load_configured(options.analysis.run, console, {.cluster_optional = true}, "assign");
+      load_configured(options.analysis.run, console, {.cluster_optional = true, .waits = true}, "assign");
   if (!workload) return kExitBad;
   if (!options.output.empty()) {
     if (const Result<void> writable = check_output(options.output); !writable) {

@@ -176,7 +176,7 @@ std::optional<Workload> load_configured(const RunArguments &arguments, Console &
 }
 
 std::optional<Workload> load_without_clusters(const RunArguments &arguments, const char *command, Console &console) {
-  std::optional<Workload> workload = load_configured(arguments, console, {}, command);
+  std::optional<Workload> workload = load_configured(arguments, console, {.waits = true}, command);
   if (!workload) return std::nullopt;
   if (const Result<void> one = refuse_clusters(*workload, command); !one) {
     console.note(one.error());
