@@ -216,8 +216,9 @@ class Merged {
     Result<std::vector<Chain>> chains = find_chains(run_, links);
     if (!chains || chains->size() != 1) return;
     watch_ = std::make_unique<ChainWatch>(run_, *std::move(chains));
-    is_sound_ =
-        visit_merged(run_, runs_, [] { return false; }, [&](auto events) { watch_->add(events); }).has_value();
+    is_sound_ = visit_merged(
+                    run_, runs_, [] { return false; }, [&](auto events) { watch_->add(events); })
+                    .has_value();
     watch_->finish();
   }
 
