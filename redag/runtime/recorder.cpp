@@ -16,6 +16,7 @@
 
 #include "redag/base/provenance.hpp"
 #include "redag/runtime/clock.hpp"
+#include "redag/runtime/system_clock.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/output_file.hpp"
 
@@ -67,6 +68,7 @@ void Recorder::end_thread() {
 Result<void> Recorder::describe_again() {
   trace::RunInfo info = describe_();
   info.machine = trace::this_machine();
+  info.clock = read_system_clock([this] { return engine_->now(); });
   info.provenance = current_provenance();
   described_at_ = monotonic_now();
   if (info.workload.dags.empty() || (flight_ && info.workload == described_)) return {};

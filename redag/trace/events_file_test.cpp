@@ -36,6 +36,7 @@ Trace example() {
   trace.info.end = trace.info.start + kSecond;
   trace.info.warm_up = 5;
   trace.info.overheads = "dispatch 3us";
+  trace.info.clock = ClockReading{.at = -5, .system = 1'769'860'800'000'000'000, .error = 130};
   trace.info.machine = Machine{8, "Linux 6.1", "a processor"};
   trace.info.provenance = {"2026-01-31T12:00:00Z", "0.1.0", "0123abc", "robot", "Linux 6.1", "redag run 'a b'", "none"};
   Rng rng(1);

@@ -6,6 +6,7 @@
 #include <array>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -99,6 +100,14 @@ Machine machine_from(const Json &json) {
   return machine;
 }
 
+std::optional<ClockReading> clock_from(const Json &json) {
+  const auto found = json.find("clock");
+  if (found == json.end()) return std::nullopt;
+  return ClockReading{.at = integer_of(*found, "at_ns", -kMaxTraceTime, kMaxTraceTime),
+                      .system = integer_of(*found, "system_ns", 0, kMaxTraceTime),
+                      .error = integer_of(*found, "error_ns", 0, kMaxTraceTime)};
+}
+
 // Files of runs without remarks, and those from before remarks existed, do not have the key.
 std::vector<Remark> remarks_from(const Json &json) {
   std::vector<Remark> remarks;
@@ -148,6 +157,7 @@ RunInfo info_from(const Json &json) {
   info.lost_events = unsigned_of(json, "lost_events");
   info.overheads = text_of(json, "overheads");
   info.machine = machine_from(member(json, "machine"));
+  info.clock = clock_from(json);
   info.remarks = remarks_from(json);
   return info;
 }
@@ -177,6 +187,9 @@ std::string run_info_to_json(const RunInfo &info) {
       {"machine", {{"cpus", info.machine.cpus}, {"kernel", info.machine.kernel}, {"model", info.machine.model}}},
       {"workload", to_yaml(info.workload)}};
   if (info.stepped) json["stepped"] = true;
+  if (info.clock) {
+    json["clock"] = {{"at_ns", info.clock->at}, {"system_ns", info.clock->system}, {"error_ns", info.clock->error}};
+  }
   for (const Remark &remark : info.remarks) {
     json["remarks"].push_back({{"begun_ns", remark.begun},
                                {"ended_ns", remark.ended == kNever ? Json() : Json(remark.ended)},

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,6 +34,15 @@ struct Machine {
   std::string model;       // processor's name
 
   friend bool operator==(const Machine &, const Machine &) = default;
+};
+
+/// The system's clock (CLOCK_REALTIME) at one instant of a run. By it, runs of several hosts have a common time.
+struct ClockReading {
+  Time at = 0;         // in the time of the trace
+  Time system = 0;     // the system's clock then, since 1970
+  Duration error = 0;  // `at` and `system` are at most this far apart
+
+  friend bool operator==(const ClockReading &, const ClockReading &) = default;
 };
 
 /// Times of a trace are at most this far from 0 (73 years). No difference of two times, or of a time and the latest
@@ -65,7 +75,8 @@ struct RunInfo {
   Machine machine;
   Provenance provenance;  // of the program that ran it; unknown in files from before this block existed
   std::vector<Remark> remarks;
-  std::vector<TaskId> event_tasks;  // timer tasks that the program releases: no grid, at least a period apart
+  std::optional<ClockReading> clock;  // none in virtual time, and in files from before it was recorded
+  std::vector<TaskId> event_tasks;    // timer tasks that the program releases: no grid, at least a period apart
 };
 
 struct Trace {

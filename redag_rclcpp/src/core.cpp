@@ -20,6 +20,7 @@
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/live_sample.hpp"
 #include "redag/runtime/spins.hpp"
+#include "redag/runtime/system_clock.hpp"
 #include "redag/runtime/threads.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 
@@ -501,6 +502,7 @@ redag::trace::RunInfo ReDAGExecutor::Core::run_info(std::vector<std::uint32_t> &
   info.driver = redag::trace::Driver::Ros;
   info.stepped = true;  // between spins no job starts, and some spin functions run one job at a time
   info.end = engine_->now();
+  info.clock = redag::runtime::read_system_clock([this] { return engine_->now(); });
   info.lost_events = engine_->lost_events();
   info.machine = redag::trace::this_machine();
   info.provenance = redag::current_provenance();

@@ -19,6 +19,7 @@
 #include "redag_lab/cli/terminal/signals.hpp"
 #include "redag_lab/experiment/acceptance_results.hpp"
 #include "redag_lab/experiment/folder.hpp"
+#include "redag_lab/hosts/document.hpp"
 #include "redag_lab/report/document.hpp"
 #include "redag_lab/report/experiment.hpp"
 #include "redag_lab/report/page.hpp"
@@ -95,6 +96,13 @@ class Reporting {
           console_.note(kernel.error());
           return false;
         }
+        Result<std::optional<hosts::RecordedHosts>> hosts = hosts::read_hosts_of(file, trace->info);
+        if (!hosts) {
+          progress_.clear();
+          console_.note(hosts.error());
+          return false;
+        }
+        if (*hosts && !any) group.set_hosts({std::move((*hosts)->document), (*hosts)->missed, (*hosts)->unknown});
         group.add(fs::path(file).parent_path().string(), *trace, *kernel ? &**kernel : nullptr);
         any = true;
         ++done;
