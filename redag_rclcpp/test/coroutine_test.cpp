@@ -124,9 +124,9 @@ INSTANTIATE_TEST_SUITE_P(Modes, CoroutineTest,
                                            redag::PreemptionMode::Os),
                          [](const auto &test) { return std::string(to_string(test.param)); });
 
-// The deadlock of the documentation of ROS 2, with one line changed. REDAG_TEST_CALLS=100000 takes a minute.
+// The deadlock of the documentation of ROS 2, with one line changed. REDAG_CALLS sets how often (100000 take seconds).
 TEST_P(CoroutineTest, ACallbackCallsAServiceWhoseClientIsInItsOwnGroup) {
-  const auto calls = static_cast<int>(from_environment("REDAG_TEST_CALLS", 500));
+  const auto calls = static_cast<int>(from_environment("REDAG_CALLS", 500));
   serve("twice");
   const auto client = client_of("twice");
   std::atomic<int> answered{0};
