@@ -5,6 +5,7 @@
 // of a driver. A body awaits it with co_await (coroutine.hpp). Any thread; the lock inherits priority.
 #pragma once
 
+#include <chrono>
 #include <memory>
 
 #include "redag/runtime/coroutine.hpp"
@@ -34,8 +35,36 @@ class AsyncEvent {
   /// For co_await.
   [[nodiscard]] Awaiter in_coroutine() noexcept;
 
+  class Until;
+  /// co_await event.wait_until(t): as co_await event, but no longer than until `time`. Returns false if the event was
+  /// not set by then.
+  [[nodiscard]] Until wait_until(std::chrono::steady_clock::time_point time) noexcept;
+
  private:
   std::unique_ptr<runtime::detail::EventState> state_;
 };
+
+class AsyncEvent::Until : public runtime::detail::Awaiter {
+ public:
+  Until(AsyncEvent &event, Time until) noexcept : event_(event) {
+    wait.kind = runtime::detail::Wait::Kind::Event;
+    wait.event = event.state_.get();
+    wait.until = until;
+  }
+  [[nodiscard]] bool await_ready() { return event_.take(); }
+  [[nodiscard]] bool await_resume() const {
+    runtime::detail::Awaiter::await_resume();
+    return !wait.timed_out;
+  }
+  /// For co_await.
+  [[nodiscard]] Until &in_coroutine() noexcept { return *this; }
+
+ private:
+  AsyncEvent &event_;
+};
+
+inline AsyncEvent::Until AsyncEvent::wait_until(std::chrono::steady_clock::time_point time) noexcept {
+  return {*this, std::chrono::nanoseconds(time.time_since_epoch()).count()};
+}
 
 }  // namespace redag

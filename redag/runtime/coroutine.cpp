@@ -16,7 +16,7 @@ void Wait::suspend(std::coroutine_handle<> its_coroutine) noexcept {
   coroutine = its_coroutine;
   engine = running->engine;
   job = running->slot;
-  cancelled = is_over = false;  // it may be awaited again
+  cancelled = timed_out = is_over = false;  // it may be awaited again
   exception = nullptr;
   running->wait = this;
 }

@@ -18,8 +18,9 @@
 
 namespace redag {
 
-/// Thrown by a co_await whose wait was ended by the stop of the executor. It is not a std::exception, so that it passes
-/// a body's own handlers. Let it pass: the job then ends, and counts as in flight.
+/// Thrown by a co_await whose wait was ended because the executor stops, or because the job's task is removed from it
+/// (in ROS 2: its node). It is not a std::exception, so that it passes a body's own handlers. Let it pass: the job then
+/// ends, and counts as in flight.
 struct WaitCancelled {};
 
 namespace runtime {
@@ -35,9 +36,10 @@ struct Wait {
   enum class Kind : std::uint8_t { Sleep, Event, Device };
 
   Kind kind = Kind::Sleep;
-  bool cancelled = false;       // by the stop of the executor
+  bool cancelled = false;       // see WaitCancelled
+  bool timed_out = false;       // Event: `until` has passed
   bool is_over = false;         // the job is woken
-  Time until = 0;               // Sleep: CLOCK_MONOTONIC
+  Time until = kNever;          // Sleep, Event: when it ends at the latest (CLOCK_MONOTONIC)
   EventState *event = nullptr;  // Event
   DeviceId device{};            // Device
   // Device: what its thread calls while it serves the job.

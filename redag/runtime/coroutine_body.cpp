@@ -3,6 +3,7 @@
 
 #include "redag/runtime/coroutine_body.hpp"
 
+#include <stdexcept>
 #include <utility>
 
 #include "redag/runtime/waiting_jobs.hpp"
@@ -10,30 +11,50 @@
 namespace redag::runtime {
 namespace {
 
-sched::Outcome begin(RunningJob &running, Coroutine body) {
+void begin(RunningJob &running, Coroutine body, CoroutineOwner *owner) {
   const Coroutine::Handle handle = body.handle();
-  if (!handle) return sched::Outcome::Finished;
+  if (!handle) return;
+  running.begins_coroutine = true;
   handle.resume();
+  running.begins_coroutine = false;
   if (handle.done()) {
     if (handle.promise().exception) std::rethrow_exception(handle.promise().exception);
-    return sched::Outcome::Finished;
+    return;
   }
   // If there is no memory, the job ends, and does not wait.
   detail::Wait *const wait = std::exchange(running.wait, nullptr);
   if (running.waiting == nullptr) running.waiting = new WaitingJob();
   running.waiting->coroutine = std::move(body);
+  running.waiting->owner = owner;
   running.wait = wait;
-  return sched::Outcome::Finished;
 }
 
 }  // namespace
 
 Body coroutine_body(CoroutineFunction function) {
-  return [function = std::move(function)](const Job &job) { return begin(*RunningJob::current(), function(job)); };
+  return [function = std::move(function)](const Job &job) {
+    begin(*RunningJob::current(), function(job), nullptr);
+    return sched::Outcome::Finished;
+  };
+}
+
+void run_in_job(Coroutine coroutine, CoroutineOwner *owner) {
+  RunningJob &running = *RunningJob::current();
+  const bool waits = running.waiting != nullptr && running.waiting->coroutine.handle();
+  if (waits || running.begins_coroutine) {
+    throw std::logic_error("a job begins a second coroutine before the first one has ended (let one await the other)");
+  }
+  begin(running, std::move(coroutine), owner);
 }
 
 sched::Outcome go_on(RunningJob &running) {
   const Coroutine::Handle handle = running.waiting->coroutine.handle();
+  running.owner = running.waiting->owner;
+  std::shared_ptr<void> held;
+  if (running.owner != nullptr) {
+    held = running.owner->hold();
+    if (!held) running.waiting->wait->cancelled = true;
+  }
   running.waiting->wait->coroutine.resume();
   if (!handle.done()) return sched::Outcome::Finished;
   const std::exception_ptr exception = handle.promise().exception;

@@ -5,8 +5,8 @@
 // what happens to the scheduler, has its decisions carried out (JobPlacement), and runs the jobs. Others release jobs
 // (release timer, rclcpp) and provide the bodies.
 //
-// Threads: any thread, also a body, may call any member but start(), join(), wait_idle(), wait_paused(), run_one() and
-// drain(). drain() is for one thread at a time. halt() is async-signal-safe. No lock is held while a body runs.
+// Threads: any thread, also a body, may call any member but start(), join(), run_one(), drain(), end_started(),
+// wait_idle() and wait_paused(). drain() is for one thread at a time. halt() is async-signal-safe. No body has a lock.
 #pragma once
 
 #include <atomic>
@@ -177,7 +177,8 @@ class Engine {
   /// `listener` can be null; otherwise the body should own it, too.
   TaskId add_task(DagId dag, std::uint32_t rank, const Task &task, Body body,
                   std::shared_ptr<SkipListener> listener = nullptr);
-  /// As remove_dag(). With reuse_ids, the caller must not use the id from here on.
+  /// As remove_dag(), and cancels the waits of the task's jobs. With reuse_ids, the caller must not use the id from
+  /// here on.
   void remove_task(TaskId task);
   void set_timing(TaskId task, Duration period, Duration deadline);
 
@@ -185,8 +186,10 @@ class Engine {
   /// just given counts as started. Releases are accepted and kept.
   void pause();
   /// While paused, waits until no started job is left. Returns false after `deadline` (CLOCK_MONOTONIC; kNever: no
-  /// limit), or if the engine is resumed.
+  /// limit), or if the engine is resumed. Jobs that wait count, and go on when they are woken.
   [[nodiscard]] bool wait_paused(Time deadline);
+  /// While paused: the same without a limit, but cancels the waits that there are, and those that begin meanwhile.
+  void end_started();
   /// Ends a pause and decides at once.
   void resume();
   /// Starts the most urgent eligible job if a worker is free for it, and runs it to its end on the calling thread, at

@@ -78,8 +78,10 @@ void Engine::remove_task(TaskId task) {
   Locked locked(*this);
   withdraw_if_halting(locked);
   tasks_.remove(task, doomed);
+  tasks_[task].waits_end = true;
   scheduler_->remove_task(task, at);
   tasks_changed();
+  waiting_.cancel(task);
   decide(locked, at);
 }
 

@@ -160,7 +160,12 @@ Time Engine::wake_sleepers() {
   Locked locked(*this);
   withdraw_if_halting(locked);
   bool woken = false;
-  for (; waiting_.next_alarm() <= due; woken = true) wake(locked, waiting_.take_sleeper(), at);
+  while (waiting_.next_alarm() <= due) {
+    const JobSlot job = waiting_.take_sleeper();
+    if (!job.valid()) continue;
+    wake(locked, job, at);
+    woken = true;
+  }
   if (woken) decide(locked, at);
   return waiting_.next_alarm();
 }
@@ -171,6 +176,19 @@ void Engine::end_service(DeviceThread &thread, JobSlot job) {
   waiting_.end_service(thread);
   wake(locked, job, at);
   decide(locked, at);
+}
+
+void Engine::end_started() {
+  {
+    const Time at = now();
+    Locked locked(*this);
+    REDAG_CHECK(paused_, "end_started() is for a paused engine");
+    waiting_.cancel_all();
+    if (waiting_.has_cancelled()) wake_cancelled(locked, at);
+  }
+  static_cast<void>(wait_paused(kNever));
+  Locked locked(*this);
+  if (halted_at_ == kNever) waiting_.accept();
 }
 
 // After the stop a device serves nobody: each job that it would serve next is woken instead.

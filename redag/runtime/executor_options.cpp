@@ -33,12 +33,14 @@ void check_duration(const char *option, nanoseconds value) {
                      format_duration(value.count())));
 }
 
-void check_devices(const std::vector<Device> &devices) {
+}  // namespace
+
+void check_devices(const char *option, const std::vector<Device> &devices) {
   if (devices.size() > kMaxDevices) {
-    refuse(fmt::format("ExecutorOptions::devices has {} entries; at most {} are allowed", devices.size(), kMaxDevices));
+    refuse(fmt::format("{} has {} entries; at most {} are allowed", option, devices.size(), kMaxDevices));
   }
   for (std::size_t d = 0; d < devices.size(); ++d) {
-    const std::string place = fmt::format("ExecutorOptions::devices[{}]", d);
+    const std::string place = fmt::format("{}[{}]", option, d);
     if (const std::string why = name_mistake(devices[d].name); !why.empty()) {
       refuse(fmt::format("{}: the name {} {}", place, in_quotes(devices[d].name), why));
     }
@@ -49,8 +51,6 @@ void check_devices(const std::vector<Device> &devices) {
     check_range("devices: slots", devices[d].slots, 1U, kMaxSlots);
   }
 }
-
-}  // namespace
 
 [[noreturn]] void refuse(const std::string &what) { throw std::invalid_argument(what); }
 
@@ -67,7 +67,7 @@ void check(const ExecutorOptions &options) {
   check_range("spare_threads", options.spare_threads, 0U, kMaxWorkers);
   check_range("trace_capacity", options.trace_capacity, std::size_t{0}, kMaxTraceCapacity);
   check_range("record_bytes", options.record_bytes, kMinRecordBytes, kMaxRecordBytes);
-  check_devices(options.devices);
+  check_devices("ExecutorOptions::devices", options.devices);
   check_duration("spin", options.spin);
   check_duration("stop_timeout", options.stop_timeout);
   if (!options.watchdog) return;

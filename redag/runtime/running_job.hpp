@@ -14,6 +14,7 @@
 
 namespace redag::runtime {
 
+class CoroutineOwner;
 class Engine;
 struct RunningJob;
 struct WaitingJob;
@@ -53,11 +54,13 @@ struct RunningJob {
   bool measured = false;       // its processor time is asked for, however short it was
   bool used_wcet_low = false;  // reported to the scheduler; written under the engine's lock
   bool used_budget = false;
-  bool reported = false;          // was reported overdue; written under the engine's lock
-  bool cancelled = false;         // it ended because its wait was cancelled
-  bool blocks = false;            // it has lent its worker: it is in a redag::Blocking
-  WaitingJob *waiting = nullptr;  // what is kept of it between its waits; null: it has not waited
-  detail::Wait *wait = nullptr;   // set by the body: what it waits for now; null: it has ended
+  bool reported = false;            // was reported overdue; written under the engine's lock
+  bool cancelled = false;           // it ended because its wait was cancelled
+  bool blocks = false;              // it has lent its worker: it is in a redag::Blocking
+  WaitingJob *waiting = nullptr;    // what is kept of it between its waits; null: it has not waited
+  detail::Wait *wait = nullptr;     // set by the body: what it waits for now; null: it has ended
+  bool begins_coroutine = false;    // the body is in the first stretch of a coroutine
+  CoroutineOwner *owner = nullptr;  // set by the body where it has one: of a coroutine that it may begin
   // Set by close():
   Time ended = kNever;    // on the engine's clock; kNever: close() has not been called
   Duration charged = 0;   // processor time of the whole job

@@ -89,7 +89,7 @@ struct TaskEntry {
   std::uint64_t late_end_to_end = 0;  // finished after the DAG's deadline
   std::uint64_t preemptions = 0;
   std::uint64_t withdrawn = 0;    // jobs skipped by halt()
-  std::uint64_t cancelled = 0;    // jobs whose wait was ended by halt()
+  std::uint64_t cancelled = 0;    // jobs whose wait was cancelled
   std::uint32_t most_waits = 0;   // of a job
   Duration longest_waits = 0;     // of a job, together
   std::uint64_t kept_worker = 0;  // calls that block for which no thread was left
@@ -98,6 +98,7 @@ struct TaskEntry {
   std::uint32_t short_jobs = 0;   // consecutive short jobs up to now; at most kStreak
   std::uint32_t tiny_score = 0;   // a tiny job adds 3, another one takes 1
   bool removed = false;
+  bool waits_end = false;  // it was removed, and its jobs no longer wait
 
  private:
   void learn(Duration took) {

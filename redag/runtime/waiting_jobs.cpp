@@ -23,29 +23,51 @@ void WaitingJobs::reserve(std::size_t jobs) {
 
 bool WaitingJobs::begin(detail::Wait &wait) {
   if (wait.kind == detail::Wait::Kind::Device) return true;
-  if (stopped_) {
+  if (stopped_ || by_slot_[wait.job.value]->entry->waits_end) {
     wait.cancelled = true;
     return false;
   }
-  if (wait.kind == detail::Wait::Kind::Event) return wait.event->add(wait);
+  if (wait.kind == detail::Wait::Kind::Event) {
+    if (!wait.event->add(wait)) return false;
+    if (wait.until != kNever) add_alarm(wait);
+    return true;
+  }
   if (wait.until <= monotonic_now()) return false;
+  add_alarm(wait);
+  return true;
+}
+
+void WaitingJobs::add_alarm(const detail::Wait &wait) {
   sleepers_.push_back({wait.until, wait.job});
   std::push_heap(sleepers_.begin(), sleepers_.end());
-  return true;
 }
 
 void WaitingJobs::end(JobSlot slot, Time now) {
   WaitingJob &job = *by_slot_[slot.value];
-  if (job.wait != nullptr) job.wait->is_over = true;
+  if (job.wait != nullptr) end(*job.wait, slot);
   job.waited += std::max<Duration>(0, now - job.since);
   job.entry->most_waits = std::max(job.entry->most_waits, ++job.waits);
   job.entry->longest_waits = std::max(job.entry->longest_waits, job.waited);
+}
+
+// A wait that can have an alarm forgets it.
+void WaitingJobs::end(detail::Wait &wait, JobSlot slot) {
+  wait.is_over = true;
+  const bool may_have_alarm = wait.cancelled || wait.kind == detail::Wait::Kind::Event;
+  if (may_have_alarm && wait.until != kNever &&
+      std::erase_if(sleepers_, [&](const Sleeper &sleeper) { return sleeper.job == slot; }) > 0) {
+    std::make_heap(sleepers_.begin(), sleepers_.end());
+  }
 }
 
 JobSlot WaitingJobs::take_sleeper() {
   const JobSlot first = sleepers_.front().job;
   std::pop_heap(sleepers_.begin(), sleepers_.end());
   sleepers_.pop_back();
+  detail::Wait &wait = *by_slot_[first.value]->wait;
+  if (wait.kind != detail::Wait::Kind::Event) return first;
+  if (!wait.event->remove(wait)) return JobSlot();
+  wait.timed_out = true;
   return first;
 }
 
@@ -60,21 +82,27 @@ void WaitingJobs::cancel_all() {
   stopped_ = true;
   sleepers_.clear();
   for_each([this](WaitingJob &job) {
-    if (job.wait != nullptr && cancel(*job.wait)) cancelled_.push_back(job.job.slot);
+    if (cancel(job.wait)) cancelled_.push_back(job.job.slot);
+  });
+}
+
+void WaitingJobs::cancel(TaskId task) {
+  for_each([&](WaitingJob &job) {
+    if (job.job.task == task && cancel(job.wait)) cancelled_.push_back(job.job.slot);
   });
 }
 
 // A job whose event has just been set is woken by the thread that set it.
-bool WaitingJobs::cancel(detail::Wait &wait) {
-  if (wait.is_over) return false;
-  switch (wait.kind) {
+bool WaitingJobs::cancel(detail::Wait *wait) {
+  if (wait == nullptr || wait->is_over) return false;
+  switch (wait->kind) {
     case detail::Wait::Kind::Device: return false;
     case detail::Wait::Kind::Event:
-      if (!wait.event->remove(wait)) return false;
+      if (!wait->event->remove(*wait)) return false;
       break;
     case detail::Wait::Kind::Sleep: break;
   }
-  wait.cancelled = true;
+  wait->cancelled = true;
   return true;
 }
 

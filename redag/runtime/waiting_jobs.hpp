@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "redag/runtime/coroutine.hpp"
+#include "redag/runtime/coroutine_body.hpp"
 #include "redag/runtime/device_threads.hpp"
 #include "redag/runtime/job_body.hpp"
 #include "redag/runtime/running_job.hpp"
@@ -23,9 +24,10 @@ struct WorkerThread;
 
 /// A job whose body has waited, from its first wait to its end. While the body runs, its thread alone uses it.
 struct WaitingJob {
-  Coroutine coroutine;             // the body; awaits others. Empty: another kind of body
-  detail::Wait *wait = nullptr;    // what it waits for; its coroutine goes on first. Null: a call that blocks
-  WorkerThread *thread = nullptr;  // on which it blocks, and goes on; null: it has none
+  Coroutine coroutine;              // the body; awaits others. Empty: another kind of body
+  CoroutineOwner *owner = nullptr;  // can be null
+  detail::Wait *wait = nullptr;     // what it waits for; its coroutine goes on first. Null: a call that blocks
+  WorkerThread *thread = nullptr;   // on which it blocks, and goes on; null: it has none
   // Of the job until its last wait:
   Job job;
   TaskEntry *entry = nullptr;
@@ -90,12 +92,16 @@ class WaitingJobs {
 
   /// When the first sleeper is to be woken (CLOCK_MONOTONIC); kNever: there is none.
   [[nodiscard]] Time next_alarm() const { return sleepers_.empty() ? kNever : sleepers_.front().until; }
-  /// Takes the first sleeper, whose wait is over.
+  /// Takes the first sleeper, whose wait is over. Not valid: the event that it waits for has just been set, and the
+  /// thread that did so wakes it.
   JobSlot take_sleeper();
 
-  /// Cancels all waits but those at devices, and from now on all that would begin. Jobs that a device serves are served
-  /// to the end.
+  /// Cancels all waits but those at devices, and until accept() all that would begin. Jobs that a device serves are
+  /// served to the end.
   void cancel_all();
+  void accept() { stopped_ = false; }
+  /// The same for the jobs of one task, for good: it has been removed (TaskEntry::waits_end).
+  void cancel(TaskId task);
   [[nodiscard]] bool has_cancelled() const { return !cancelled_.empty(); }
   /// Takes a job whose wait was cancelled and that is to be woken.
   JobSlot take_cancelled() {
@@ -111,12 +117,14 @@ class WaitingJobs {
     // For the standard's heaps, whose top is the largest.
     friend bool operator<(const Sleeper &a, const Sleeper &b) { return a.until > b.until; }
   };
-  [[nodiscard]] static bool cancel(detail::Wait &wait);
+  [[nodiscard]] static bool cancel(detail::Wait *wait);
+  void end(detail::Wait &wait, JobSlot slot);
+  void add_alarm(const detail::Wait &wait);
 
   DeviceThreads &devices_;
   std::vector<WaitingJob *> by_slot_;  // null: none of these jobs has the slot
   std::size_t count_ = 0;
-  std::vector<Sleeper> sleepers_;   // a heap
+  std::vector<Sleeper> sleepers_;   // a heap; also the waits for events that have a limit
   std::vector<JobSlot> cancelled_;  // to be woken
   bool stopped_ = false;
 };

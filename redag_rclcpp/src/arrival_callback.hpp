@@ -31,6 +31,7 @@ class ArrivalCallback : public Callback, public Hooked {
   [[nodiscard]] std::vector<TaskId> publishers() const override;
   [[nodiscard]] Duration mean_interval() const override;
   [[nodiscard]] std::vector<KeptInput> kept() const override;
+  [[nodiscard]] std::shared_ptr<void> hold() override { return entity(); }
 
   void arrived_in_middleware(std::size_t count) noexcept override { arrived(count, Source::Middleware, 0); }
   Time expire(Time now, std::vector<redag::runtime::Release> &releases,

@@ -36,7 +36,8 @@ bool Bounds::update(const std::vector<CallbackStats> &stats, const redag::sched:
                     const std::function<Workload()> &learned) {
   std::vector<std::string> now;
   for (const CallbackStats &callback : stats) {
-    if (!callback.dag.empty()) now.push_back(callback.task + " " + to_string(callback.id));
+    if (callback.dag.empty()) continue;
+    now.push_back(callback.task + " " + to_string(callback.id) + (callback.waits > 0 ? " waits" : ""));
   }
   std::sort(now.begin(), now.end());
   if (now.empty() || now == analysed_) return false;
@@ -74,6 +75,9 @@ bool Bounds::as_executed(const std::vector<CallbackStats> &stats, const Workload
         if (period > 0 && task.activation == redag::Activation::Timer && period != task.period) {
           absent_ = fmt::format("the timer of {} has a period of {}, but the workload states {}", name,
                                 redag::format_duration(period), redag::format_duration(task.period));
+        }
+        if (callback.waits > 0) {
+          absent_ = fmt::format("the callback of {} waits (co_await), and the bounds do not know waits", name);
         }
         task.group = group_of(learned, name);
       }

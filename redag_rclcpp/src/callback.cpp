@@ -3,23 +3,54 @@
 
 #include "callback.hpp"
 
+#include <stdexcept>
 #include <utility>
 
 #include "redag/runtime/running_job.hpp"
+#include "redag/runtime/waiting_jobs.hpp"
 
 namespace redag_rclcpp {
 
 using redag::sched::Outcome;
 
 Outcome Callback::execute(const redag::runtime::Job &job) {
-  if (!run()) return Outcome::NoData;
   redag::runtime::RunningJob &running = *redag::runtime::RunningJob::current();
+  running.owner = this;
+  if (!run()) return Outcome::NoData;
+  if (running.waiting == nullptr) count_job(running, job.release);
+  return Outcome::Finished;
+}
+
+void Callback::count_job(redag::runtime::RunningJob &running, Time release) {
   running.close();
-  const Duration response = running.ended - job.release;
+  const Duration response = running.ended - release;
   response_.add(response);
   if (response > deadline()) count_late();
   execution_.add(running.charged);
-  return Outcome::Finished;
+}
+
+std::shared_ptr<ExecutorContext> Callback::context_now() const {
+  const redag::LockGuard guard(lock_);
+  if (!context_) throw redag::WaitCancelled{};  // the callback has left the executor
+  return context_;
+}
+
+redag::runtime::DeviceHandle Callback::device(const std::string &name) const { return context_now()->device(name); }
+
+void Callback::let_wait() const {
+  const std::shared_ptr<ExecutorContext> context = context_now();
+  if (!context->direct()) {
+    throw std::logic_error(
+        "redag_rclcpp::coroutine(): a callback can wait only while spin() runs it (spin_some(), spin_all(), "
+        "spin_once() and spin_until_future_complete() have no worker that would go on with it)");
+  }
+  context->let_wait();
+}
+
+// A coroutine that did not wait is counted by execute().
+void Callback::coroutine_ended() {
+  redag::runtime::RunningJob &running = *redag::runtime::RunningJob::current();
+  if (running.waiting != nullptr) count_job(running, running.waiting->job.release);
 }
 
 std::shared_ptr<ExecutorContext> Callback::leave() {

@@ -12,6 +12,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "deadlock_detector.hpp"
@@ -20,6 +21,7 @@
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/pi_mutex.hpp"
 #include "redag/model/callback_match.hpp"
+#include "redag/runtime/coroutine_body.hpp"
 #include "redag/runtime/engine.hpp"
 #include "timer_queue.hpp"
 #include "wait_set_member.hpp"
@@ -29,6 +31,7 @@ namespace redag_rclcpp {
 class Callback : public TimerQueue::Timer,
                  public WaitSetMember,
                  public redag::runtime::SkipListener,
+                 public redag::runtime::CoroutineOwner,
                  public std::enable_shared_from_this<Callback> {
  public:
   /// Connects the entity: later arrivals are released as jobs of `task`. True if a wait set must watch it.
@@ -44,6 +47,15 @@ class Callback : public TimerQueue::Timer,
 
   /// Runs one job. NoData: there was nothing to execute.
   redag::sched::Outcome execute(const redag::runtime::Job &job);
+
+  /// Called in one of its jobs, before a coroutine begins in it. Throws std::logic_error if jobs cannot wait now.
+  void let_wait() const;
+  /// See ExecutorContext.
+  [[nodiscard]] redag::runtime::DeviceHandle device(const std::string &name) const;
+  /// Called at the end of a job's coroutine, in the job.
+  void coroutine_ended();
+  /// True if the middleware takes messages back when the callback returns.
+  [[nodiscard]] virtual bool lends_messages() const { return false; }
 
   /// Releases what has arrived. Called for callbacks that ExecutorContext::note() collected.
   virtual void admit() = 0;
@@ -93,6 +105,9 @@ class Callback : public TimerQueue::Timer,
   virtual bool connect() = 0;
   /// Runs the callback for one job. False: there was nothing to execute.
   [[nodiscard]] virtual bool run() = 0;
+  /// Throws redag::WaitCancelled once detached.
+  [[nodiscard]] std::shared_ptr<ExecutorContext> context_now() const REDAG_EXCLUDES(lock_);
+  void count_job(redag::runtime::RunningJob &running, Time release);
 
   const redag::CallbackId id_;
   redag::runtime::Engine &engine_;

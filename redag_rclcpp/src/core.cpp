@@ -18,6 +18,7 @@
 #include "rclcpp/logging.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/runtime/clock.hpp"
+#include "redag/runtime/executor_options.hpp"
 #include "redag/runtime/live_sample.hpp"
 #include "redag/runtime/spins.hpp"
 #include "redag/runtime/system_clock.hpp"
@@ -47,6 +48,7 @@ ReDAGOptions prepare(ReDAGOptions options) {
   }
   if (options.spin < nanoseconds(0)) throw std::invalid_argument("spin must not be negative");
   if (options.watchdog < nanoseconds(0)) throw std::invalid_argument("watchdog must not be negative");
+  redag::runtime::check_devices("ReDAGOptions::devices", options.devices);
   if (!options.workload) return options;
   const auto findings = redag::validate(*options.workload, redag::ValidateOptions{.wcet_optional = true});
   if (has_errors(findings)) throw std::runtime_error(to_string(findings));
@@ -82,8 +84,10 @@ ReDAGExecutor::Core::Core(const rclcpp::Context::SharedPtr &context, ReDAGOption
       engine_(make_engine()),
       timer_(*engine_, origin_),
       bridge_(context),
-      tasks_(redag::Platform{setup_.config.workers, setup_.mode.mode}, options_.policy, options_.ties,
-             options_.workload ? &*options_.workload : nullptr),
+      tasks_(
+          redag::Platform{
+              .workers = setup_.config.workers, .preemption = setup_.mode.mode, .devices = options_.devices},
+          options_.policy, options_.ties, options_.workload ? &*options_.workload : nullptr),
       registry_(context, options_, setup_.config.workers,
                 {.engine = *engine_, .timer = timer_, .bridge = bridge_, .tasks = tasks_}) {
   engine_->share_releases(timer_.thread());
@@ -104,9 +108,13 @@ std::unique_ptr<redag::runtime::Engine> ReDAGExecutor::Core::make_engine() {
   options.cpus = options_.cpus;
   options.trace_capacity = options_.trace_capacity;
   options.measure = options_.live;
+  options.waits_priority = setup_.timer_priority();
   options.start_paused = true;
   options.on_exception = [this](const redag::runtime::Job &job, std::exception_ptr e) { on_exception(job, e); };
-  auto scheduler = std::make_unique<redag::sched::PriorityScheduler>(Workload{}, options.config);
+  options.devices = options_.devices;
+  Workload empty;
+  empty.platform.devices = options_.devices;
+  auto scheduler = std::make_unique<redag::sched::PriorityScheduler>(empty, options.config);
   auto engine = std::make_unique<redag::runtime::Engine>(std::move(scheduler), std::move(options));
   engine->set_origin(origin_);
   return engine;
@@ -171,6 +179,23 @@ void ReDAGExecutor::Core::timers_changed() {
 void ReDAGExecutor::Core::exchange_arrived() {
   if (!options_.deadlocks || looks_for_deadlocks_.load(std::memory_order_relaxed)) return;
   if (!looks_for_deadlocks_.exchange(true)) keeper_parker_.unpark();
+}
+
+void ReDAGExecutor::Core::let_wait() {
+  if (lets_wait_.load(std::memory_order_acquire)) return;
+  const redag::LockGuard guard(let_wait_lock_);
+  if (const redag::Result<void> ready = engine_->let_wait(); !ready) throw std::runtime_error(to_string(ready.error()));
+  lets_wait_.store(true, std::memory_order_release);
+}
+
+redag::runtime::DeviceHandle ReDAGExecutor::Core::device(const std::string &name) const {
+  for (std::size_t d = 0; d < options_.devices.size(); ++d) {
+    if (options_.devices[d].name == name) return {*engine_, redag::DeviceId(d)};
+  }
+  throw std::out_of_range(fmt::format(
+      "redag_rclcpp::device(): the executor has no device '{}' (add it to ReDAGOptions::devices, or to the platform of "
+      "the workload file)",
+      name));
 }
 
 void ReDAGExecutor::Core::wait_set_changed() {
@@ -404,7 +429,7 @@ void ReDAGExecutor::Core::watch_wait_set() noexcept {
 void ReDAGExecutor::Core::stop_workers() {
   timer_.pause();
   engine_->pause();
-  (void)engine_->wait_paused(kNever);
+  engine_->end_started();
   direct_ = false;
   if (look_for_deadlocks_at_ != kNever) look_for_deadlocks();  // those of the jobs that have ended are over
 }

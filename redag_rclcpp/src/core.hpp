@@ -84,6 +84,8 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
   void exchange_arrived() override;
   void entities_changed() override;
   [[nodiscard]] bool learning() const override { return learning_; }
+  void let_wait() override;
+  [[nodiscard]] redag::runtime::DeviceHandle device(const std::string &name) const override;
 
  private:
   [[nodiscard]] std::unique_ptr<redag::runtime::Engine> make_engine();
@@ -132,6 +134,9 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
   std::vector<redag::runtime::StartedJob> started_jobs_;  // for look_for_deadlocks()
   bool started_ = false;
   std::string start_error_;  // why the engine could not start; stays set
+
+  redag::PiMutex let_wait_lock_;
+  std::atomic<bool> lets_wait_{false};  // written under that lock
 
   redag::PiMutex noted_lock_;
   std::vector<std::shared_ptr<Callback>> noted_ REDAG_GUARDED_BY(noted_lock_);

@@ -5,7 +5,9 @@
 #pragma once
 
 #include <memory>
+#include <string>
 
+#include "redag/runtime/device_handle.hpp"
 #include "redag/runtime/engine.hpp"
 #include "timer_queue.hpp"
 
@@ -34,6 +36,11 @@ class ExecutorContext {
   /// Called when a node or group may have other entities than before.
   virtual void entities_changed() = 0;
   [[nodiscard]] virtual bool learning() const = 0;
+  /// Called before a job can wait. The first call creates the engine's threads for that. Throws std::runtime_error if
+  /// the system refuses them.
+  virtual void let_wait() = 0;
+  /// Throws std::out_of_range if the executor has no device of this name.
+  [[nodiscard]] virtual redag::runtime::DeviceHandle device(const std::string &name) const = 0;
 };
 
 }  // namespace redag_rclcpp

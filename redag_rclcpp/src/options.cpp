@@ -196,6 +196,7 @@ void read_config(rclcpp::Node &node, Reader &reader, ReDAGOptions &options) {
   if (options.preemption == redag::PreemptionMode::Auto) options.preemption = workload.platform.preemption;
   if (options.policy == redag::PolicyKind::RateMonotonic) options.policy = workload.policy;
   if (options.ties == redag::Ties::Share) options.ties = workload.ties;
+  if (options.devices.empty()) options.devices = workload.platform.devices;
   options.workload = std::move(loaded->workload);
 }
 

@@ -72,6 +72,10 @@ class SubscriptionCallback final : public ArrivalCallback {
         has_intra_process_(intra_process != nullptr) {}
 
   [[nodiscard]] bool alive() const override { return !subscription_.expired(); }
+  [[nodiscard]] bool lends_messages() const override {
+    const auto subscription = subscription_.lock();
+    return subscription && subscription->can_loan_messages();
+  }
 
   // The part of what is held is the waitable.
   [[nodiscard]] Held hooked() const override {

@@ -157,7 +157,9 @@ std::vector<CallbackStats> TaskTable::stats(const redag::runtime::Engine &engine
   for (Row &row : rows) {
     CallbackStats &stats = row.stats;
     const Callback &callback = *row.callback;
-    stats.jobs = engine.accounting(row.task);
+    const redag::runtime::TaskFigures figures = engine.figures(row.task);
+    stats.jobs = figures.jobs;
+    stats.waits = figures.most_waits;
     stats.misses = callback.late() + stats.jobs.lost();
     stats.response_p50 = callback.response().percentile(0.5);
     stats.response_p99 = callback.response().percentile(0.99);

@@ -74,6 +74,9 @@ class TimerCallback final : public Callback {
   void admit() override {}
   [[nodiscard]] bool alive() const override { return !timer_.expired() && (!is_owned_ || !owner_.expired()); }
   [[nodiscard]] bool has_rate() const override { return true; }
+  [[nodiscard]] std::shared_ptr<void> hold() override {
+    return is_owned_ && owner_.expired() ? nullptr : timer_.lock();
+  }
   [[nodiscard]] std::vector<TaskId> publishers() const override { return {}; }
   [[nodiscard]] Duration mean_interval() const override { return 0; }
 

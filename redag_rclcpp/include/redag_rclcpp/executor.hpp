@@ -49,6 +49,7 @@ struct ReDAGOptions {
   redag::Ties ties = redag::Ties::Share;  // callbacks of equal priority: earlier release first, or a fixed order
   std::uint32_t threads = 0;              // os: callbacks that can be started and unfinished at once; 0: workers + 16
   std::vector<int> cpus{};                // processors for the workers; empty: os takes `workers` of the usable ones
+  std::vector<redag::Device> devices{};   // accelerators for redag_rclcpp::device() (coroutine.hpp)
 
   /// States which callback is which task of which DAG (docs/workload_format.md, `callback`). The executor does not read
   /// the workload's platform and policy; declare_options() does.
@@ -99,6 +100,7 @@ struct CallbackStats {
   redag::Duration execution_p50 = 0;  // processor time
   redag::Duration execution_p99 = 0;
   redag::Duration execution_max = 0;
+  std::uint32_t waits = 0;  // the most co_awaits of one job
 };
 
 /// A callback that waited for a response which could not reach it.
