@@ -105,8 +105,8 @@ TEST(WaitingTimes, AreNotCoveredWhereNoProofIsKnown) {
   EXPECT_TRUE(compiled(three(), other).has_waits);
   other.max_started = 4;
   EXPECT_TRUE(compiled(three(), other).has_waits);
-  Workload workload = testing::make_workload({testing::tick_dag("a", {{"first", 100, 4, {}}, {"then", 100, 2, {0}}})}, 1,
-                                             PreemptionMode::Auto);
+  Workload workload = testing::make_workload({testing::tick_dag("a", {{"first", 100, 4, {}}, {"then", 100, 2, {0}}})},
+                                             1, PreemptionMode::Auto);
   workload.dags[0].tasks[0].waits = {Wait{1, 5, 0, {}}};
   other = platform_of(workload);
   other.max_started = 1;
