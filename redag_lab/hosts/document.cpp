@@ -154,14 +154,16 @@ void add_verdicts(const Chain &chain, const ChainFigures &figures, std::vector<S
   const std::uint64_t unknown = figures.count(Verdict::Unknown);
   const std::string deadline = format_duration(chain.deadline);
   if (missed > 0) {
-    all.push_back({Sentence::Tone::Bad,
-                   fmt::format("{}: {} missed the deadline {}, whatever the clocks were within their uncertainty",
-                               chain.name, format_share(missed, figures.answers), deadline)});
+    all.push_back(
+        {Sentence::Tone::Bad,
+         fmt::format("{}: {} of the answers missed the deadline {}, whatever the clocks were within their uncertainty",
+                     chain.name, format_share(missed, figures.answers), deadline)});
   }
   if (unknown > 0) {
-    all.push_back({Sentence::Tone::Caution,
-                   fmt::format("{}: {} cannot be told: the deadline {} is within the uncertainty of the clocks",
-                               chain.name, format_share(unknown, figures.answers), deadline)});
+    all.push_back(
+        {Sentence::Tone::Caution,
+         fmt::format("{}: {} of the answers cannot be told: the deadline {} is within the uncertainty of the clocks",
+                     chain.name, format_share(unknown, figures.answers), deadline)});
   }
   if (missed + unknown == 0) {
     all.push_back({Sentence::Tone::Good,

@@ -136,6 +136,8 @@ class Reporting {
     }
     std::string text;
     for (const report::Group &group : groups_) {
+      // What is true of each host is not all that the page says.
+      if (group.hosts().missed + group.hosts().unknown > 0) text += report::headline_of({&group, 1}).text + "\n";
       text += (groups_.size() > 1 ? group.label() + ": " : "") + report::verdict_of(group).front().text + "\n";
     }
     text += fmt::format("{}: {:.1f} MB, opens in any browser without a network\n", path,

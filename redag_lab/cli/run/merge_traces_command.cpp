@@ -171,7 +171,7 @@ class Collector {
     const Result<robot::Input> input = robot::load_input(options_.robot, {.wcet_optional = true});
     if (!input) return keep(input.error());
     if (!input->robot) {
-      return keep({Diagnostic{Severity::Error, options_.robot, 1, 0, "--robot: the file is no robot file",
+      return keep({Diagnostic{Severity::Error, options_.robot, 1, 1, "--robot: the file is no robot file",
                               "a robot file has the key 'robot:' (docs/robot.md)"}});
     }
     const auto is_host = [&](std::size_t process) {
