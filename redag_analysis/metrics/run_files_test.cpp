@@ -50,8 +50,7 @@ TEST_F(RunFilesTest, AnotherFormReplacesTheFilesOfTheFirst) {
   EXPECT_EQ(*names, "jobs.csv, events.jsonl");
   EXPECT_FALSE(fs::exists(folder_ / "events.redag"));
   EXPECT_FALSE(fs::exists(folder_ / "trace.pftrace"));
-  const auto fewer =
-      write_run_files({.folder = folder_.string(), .jobs = false, .picture = Picture::Never}, example());
+  const auto fewer = write_run_files({.folder = folder_.string(), .jobs = false, .picture = Picture::Never}, example());
   ASSERT_TRUE(fewer) << to_string(fewer.error());
   EXPECT_EQ(*fewer, "events.redag");
   EXPECT_FALSE(fs::exists(folder_ / "jobs.csv"));
