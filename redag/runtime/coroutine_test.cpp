@@ -208,6 +208,19 @@ std::vector<int> order_of_service(PreemptionMode mode, Device::Queue queue) {
   return order;
 }
 
+// What the device is to do can own something that cannot be copied, and is not copied.
+TEST(Coroutine, WhatADeviceDoesIsMovedOnly) {
+  Executor executor(with_gpu());
+  const DeviceHandle gpu = executor.device("gpu");
+  int value = 0;
+  executor.add(once("job", [&]() -> Coroutine {
+    co_await gpu.run([&, owned = std::make_unique<int>(7)] { value = *owned; });
+    executor.stop();
+  }));
+  executor.run();
+  EXPECT_EQ(value, 7);
+}
+
 TEST(Coroutine, ADeviceServesTheMostUrgentJobFirst) {
   EXPECT_EQ(order_of_service(PreemptionMode::None, Device::Queue::Priority), (std::vector<int>{9, 3, 2, 1}));
 }

@@ -50,8 +50,8 @@ class DeviceHandle::Run : public detail::Awaiter {
     wait.argument = std::addressof(function_);
     wait.suspend(coroutine);
   }
-  /// For co_await.
-  [[nodiscard]] Run &in_coroutine() noexcept { return *this; }
+  /// For co_await. By value: GCC 12 copies an awaiter that it is given by reference.
+  [[nodiscard]] Run in_coroutine() && { return std::move(*this); }
 
  private:
   DeviceHandle device_;

@@ -106,6 +106,7 @@ std::unique_ptr<redag::runtime::Engine> ReDAGExecutor::Core::make_engine() {
   options.order_folder = setup_.order_folder;
   options.throttling = setup_.throttling;
   options.cpus = options_.cpus;
+  options.spare_threads = options_.spare_threads;
   options.trace_capacity = options_.trace_capacity;
   options.measure = options_.live;
   options.waits_priority = setup_.timer_priority();

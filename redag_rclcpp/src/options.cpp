@@ -278,6 +278,12 @@ ReDAGOptions declare_options(rclcpp::Node &node) {
       "Number of threads with preemption os: callbacks that can be started and unfinished at once; 0: workers + 16",
       fmt::format("0, or a whole number from the number of workers to {}", kMostThreads)};
   options.threads = static_cast<std::uint32_t>(reader.integer(threads, 0, 0, kMostThreads));
+  options.spare_threads = static_cast<std::uint32_t>(
+      reader.integer({"spare_threads",
+                      "Number of threads besides the workers with preemption none and cooperative, for callbacks that "
+                      "block in a redag::Blocking and leave their workers to others",
+                      fmt::format("a whole number from 0 to {}", kMostThreads)},
+                     0, 0, kMostThreads));
   options.cpus = read_cpus(reader);
   read_config(node, reader, options);
   if (options.threads > 0 && options.threads < options.workers) {

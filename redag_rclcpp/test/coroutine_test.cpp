@@ -23,6 +23,7 @@
 #include "environment.hpp"
 #include "mode_test.hpp"
 #include "rclcpp/rclcpp.hpp"
+#include "redag/runtime/blocking.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"
 #include "spinning.hpp"
 
@@ -342,6 +343,24 @@ TEST_P(CoroutineTest, ADeviceServesACallback) {
   EXPECT_GE(served, rounds);
   options.devices.push_back({.name = "gpu"});
   EXPECT_THROW(ReDAGExecutor{options}, std::invalid_argument) << "two of one name";
+}
+
+// A synchronous call with one worker: the client is in a group of its own, and the worker is lent.
+TEST_P(CoroutineTest, ACallThatBlocksLendsItsWorker) {
+  serve("double");
+  options.spare_threads = 1;
+  const auto group = groups.emplace_back(node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive));
+  const auto client = node->create_client<Service>("double", compat::services_qos(), group);
+  std::atomic<int> result{0};
+  timer(10ms, [&, first = std::make_shared<Once>()] {
+    if (!(*first)()) return;
+    const redag::Blocking scope;
+    EXPECT_TRUE(scope.lends());
+    ASSERT_TRUE(client->wait_for_service(60s));
+    result = number_in(*client->async_send_request(ask(21)).get());
+  });
+  spin_until([&] { return result != 0; });
+  EXPECT_EQ(result.load(), 42);
 }
 
 TEST_P(CoroutineTest, CancelEndsWaits) {

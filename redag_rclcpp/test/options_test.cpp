@@ -110,6 +110,7 @@ TEST_F(OptionsTest, ValuesAreRead) {
                                {"policy", "deadline_monotonic"},
                                {"ties", "fixed"},
                                {"threads", 7},
+                               {"spare_threads", 3},
                                {"cpu_affinity", std::vector<std::int64_t>{cpu}},
                                {"default_period", 0.02},
                                {"learn", 1.5},
@@ -133,6 +134,7 @@ TEST_F(OptionsTest, ValuesAreRead) {
   EXPECT_EQ(options.policy, redag::PolicyKind::DeadlineMonotonic);
   EXPECT_EQ(options.ties, redag::Ties::Fixed);
   EXPECT_EQ(options.threads, 7U);
+  EXPECT_EQ(options.spare_threads, 3U);
   EXPECT_EQ(options.cpus, std::vector<int>{static_cast<int>(cpu)});
   EXPECT_EQ(options.default_period, 20ms);
   EXPECT_EQ(options.learn, 1500ms);
@@ -292,7 +294,8 @@ TEST_F(OptionsTest, AnyValuesAreReadOrRefused) {
   const std::vector<std::string> names{
       "workers",        "preemption",   "policy",           "ties",      "threads",        "cpu_affinity", "config",
       "default_period", "learn",        "raise_middleware", "live",      "metrics_period", "trace",        "bounds",
-      "trace_events",   "metrics_file", "save_path",        "overheads", "deadlocks",      "events",       "picture"};
+      "trace_events",   "metrics_file", "save_path",        "overheads", "deadlocks",      "events",       "picture",
+      "spare_threads"};
   const std::string workload = file_with(kWorkload);
   const std::uint64_t seed = from_environment("REDAG_SEED", 1);
   const std::uint64_t rounds = from_environment("REDAG_OPTION_ROUNDS", 400);
@@ -341,11 +344,11 @@ TEST_F(OptionsTest, ParametersSayWhatTheyAreAndStay) {
   const auto node = node_with({});
   const ReDAGOptions options = declare_options(*node);
   (void)declare_monitor_options(*node, options);
-  for (const char *name : {"workers",      "preemption", "policy",         "ties",           "threads",
-                           "cpu_affinity", "config",     "default_period", "learn",          "raise_middleware",
-                           "lock_memory",  "spin",       "watchdog",       "metrics_period", "trace",
-                           "events",       "picture",    "bounds",         "trace_events",   "metrics_file",
-                           "save_path",    "share_order"}) {
+  for (const char *name : {"workers",      "preemption",  "policy",         "ties",           "threads",
+                           "cpu_affinity", "config",      "default_period", "learn",          "raise_middleware",
+                           "lock_memory",  "spin",        "watchdog",       "metrics_period", "trace",
+                           "events",       "picture",     "bounds",         "trace_events",   "metrics_file",
+                           "save_path",    "share_order", "spare_threads"}) {
     const auto descriptor = node->describe_parameter(name);
     EXPECT_FALSE(descriptor.description.empty()) << name;
     EXPECT_FALSE(descriptor.additional_constraints.empty()) << name;

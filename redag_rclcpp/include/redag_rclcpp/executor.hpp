@@ -48,8 +48,10 @@ struct ReDAGOptions {
   redag::PolicyKind policy = redag::PolicyKind::RateMonotonic;
   redag::Ties ties = redag::Ties::Share;  // callbacks of equal priority: earlier release first, or a fixed order
   std::uint32_t threads = 0;              // os: callbacks that can be started and unfinished at once; 0: workers + 16
-  std::vector<int> cpus{};                // processors for the workers; empty: os takes `workers` of the usable ones
-  std::vector<redag::Device> devices{};   // accelerators for redag_rclcpp::device() (coroutine.hpp)
+  /// none, cooperative: callbacks that can be in a redag::Blocking without a worker at a time, with a thread for each.
+  std::uint32_t spare_threads = 0;
+  std::vector<int> cpus{};               // processors for the workers; empty: os takes `workers` of the usable ones
+  std::vector<redag::Device> devices{};  // accelerators for redag_rclcpp::device() (coroutine.hpp)
 
   /// States which callback is which task of which DAG (docs/workload_format.md, `callback`). The executor does not read
   /// the workload's platform and policy; declare_options() does.
