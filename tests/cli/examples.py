@@ -185,7 +185,8 @@ class Examples(Case):
             options, examples = text.split("\nExamples:\n")
             for option in re.findall(r"(?<=redag )[^|]*?(--[a-z-]+)", examples):
                 self.assertIn(option, text, command)
-            for example in map(str.strip, examples.strip().splitlines()):
+            one_line_each = re.sub(r" \\\n\s+", " ", examples.strip())
+            for example in map(str.strip, one_line_each.splitlines()):
                 with self.subTest(example):
                     for file in re.findall(r"\b(?:workloads|experiments)/\w\S*\.yaml", example):
                         self.assertTrue((SOURCE / file).exists(), example)
