@@ -16,6 +16,7 @@
 
 #include "redag_analysis/analyze/executors.hpp"
 #include "redag_testing/bound_property.hpp"
+#include "redag_testing/random_workloads.hpp"
 
 namespace redag::analysis {
 namespace {
@@ -27,6 +28,9 @@ testing::BoundCase with_tick(testing::BoundCase bound_case, Duration tick) {
       for (Duration *time : {&task.period, &task.deadline, &task.wcet, &task.wcet_low, &task.bcet, &task.offset,
                              &task.jitter, &task.region}) {
         *time *= tick;
+      }
+      for (Wait &wait : task.waits) {
+        for (Duration *time : {&wait.after, &wait.longest, &wait.shortest}) *time *= tick;
       }
     }
   }
@@ -116,7 +120,11 @@ TEST_P(CoarserClock, NoBoundIsBroken) {
         limits.jitter = limits.caps = true;
         limits.max_dags = 4;
         limits.max_utilization = 0.8;
-        const auto generator = [&](Rng &rng) { return with_tick(random_bound_case(rng, limits), tick); };
+        const auto generator = [&](Rng &rng) {
+          testing::BoundCase drawn = random_bound_case(rng, limits);
+          if (method.name.starts_with("suspension_aware")) testing::add_waits(rng, drawn.workload);
+          return with_tick(std::move(drawn), tick);
+        };
         const testing::BoundPropertyResult result =
             testing::check_bound(method, generator, {.workloads = 10, .runs = 3, .periods = 5});
         EXPECT_EQ(result.violations, 0U) << result.first_violation;

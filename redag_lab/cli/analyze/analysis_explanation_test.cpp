@@ -102,7 +102,7 @@ TEST(Explanation, OfEachKindOfTermSaysWhatItIsAndWhatHelps) {
       {term(Kind::Interference, 6), "more urgent work", "more urgent work runs first"},
       {term(Kind::Jitter, 6), "release jitter", "less release jitter helps most"},
       {term(Kind::Wait, 6), "waiting for data of other rates", "response time of its predecessors helps most"},
-      {term(Kind::Suspended, 6), "its waits without a worker", "shorter service of less urgent tasks at its devices"},
+      {term(Kind::Suspended, 6), "waits without a device", "a shorter wait helps most"},
       {term(Kind::Overhead, 6), "overhead", "fewer and longer jobs, or smaller scheduling overheads, help most"},
       {term(Kind::Waiting, 6), "all waiting together", "without --explore, the bounds name the causes"},
   };
