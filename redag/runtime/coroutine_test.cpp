@@ -208,17 +208,19 @@ std::vector<int> order_of_service(PreemptionMode mode, Device::Queue queue) {
   return order;
 }
 
-// What the device is to do can own something that cannot be copied, and is not copied.
-TEST(Coroutine, WhatADeviceDoesIsMovedOnly) {
+// What the device is to do can own something that cannot be copied.
+TEST(Coroutine, AFunctionWithANameIsNotCopied) {
   Executor executor(with_gpu());
   const DeviceHandle gpu = executor.device("gpu");
   int value = 0;
   executor.add(once("job", [&]() -> Coroutine {
-    co_await gpu.run([&, owned = std::make_unique<int>(7)] { value = *owned; });
+    const auto read = [&, owned = std::make_unique<int>(7)] { value += *owned; };
+    co_await gpu.run(read);
+    co_await gpu.run(read);
     executor.stop();
   }));
   executor.run();
-  EXPECT_EQ(value, 7);
+  EXPECT_EQ(value, 14);
 }
 
 TEST(Coroutine, ADeviceServesTheMostUrgentJobFirst) {

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <memory>
+#include <type_traits>
 #include <utility>
 
 #include "redag/runtime/coroutine.hpp"
@@ -21,9 +22,18 @@ class DeviceHandle {
   /// device calls `f`, which submits work to the accelerator and returns when it is done. Then the slot is free, and
   /// the job goes on. The co_await throws what `f` throws, and std::logic_error in a job of another executor. `f` is no
   /// part of the job: it has no budget and no preemption points, and may block.
+  /// A function that has a name is not copied.
   template <class Function>
-  [[nodiscard]] Run<Function> run(Function function) const {
-    return Run<Function>(*this, std::move(function));
+  [[nodiscard]] auto run(Function &&function) const {
+#if defined(__GNUC__) && !defined(__clang__)
+    // Seen with GCC 12: of a lambda that stands in the co_await itself, what it has captured is destroyed twice.
+    static_assert(std::is_lvalue_reference_v<Function> || std::is_trivially_destructible_v<Function>,
+                  "GCC destroys what this function has captured twice: give the function a name before the co_await "
+                  "(auto f = [...] {...}; co_await device.run(f);)");
+#endif
+    // Of a plain function, a pointer is kept.
+    constexpr bool kIsPlain = std::is_function_v<std::remove_reference_t<Function>>;
+    return Run<std::conditional_t<kIsPlain, std::decay_t<Function>, Function>>(*this, std::forward<Function>(function));
   }
 
   /// For the executor: device number `device` of the engine.
@@ -40,13 +50,13 @@ class DeviceHandle {
 template <class Function>
 class DeviceHandle::Run : public detail::Awaiter {
  public:
-  Run(const DeviceHandle &device, Function function) : device_(device), function_(std::move(function)) {
+  Run(const DeviceHandle &device, Function &&function) : device_(device), function_(std::forward<Function>(function)) {
     wait.kind = detail::Wait::Kind::Device;
     wait.device = device.device_;
   }
   void await_suspend(std::coroutine_handle<> coroutine) {
     device_.check();
-    wait.function = [](void *function) { (*static_cast<Function *>(function))(); };
+    wait.function = [](void *function) { (*static_cast<std::remove_reference_t<Function> *>(function))(); };
     wait.argument = std::addressof(function_);
     wait.suspend(coroutine);
   }
@@ -55,7 +65,7 @@ class DeviceHandle::Run : public detail::Awaiter {
 
  private:
   DeviceHandle device_;
-  Function function_;
+  Function function_;  // a reference to it if it has a name
 };
 
 }  // namespace redag::runtime
