@@ -57,7 +57,7 @@ class DeviceHandle::Run : public detail::Awaiter {
   void await_suspend(std::coroutine_handle<> coroutine) {
     device_.check();
     wait.function = [](void *function) { (*static_cast<std::remove_reference_t<Function> *>(function))(); };
-    wait.argument = std::addressof(function_);
+    wait.argument = const_cast<void *>(static_cast<const void *>(std::addressof(function_)));
     wait.suspend(coroutine);
   }
   /// For co_await. By value: GCC 12 copies an awaiter that it is given by reference.
