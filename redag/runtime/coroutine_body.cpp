@@ -47,15 +47,26 @@ void run_in_job(Coroutine coroutine, CoroutineOwner *owner) {
   begin(running, std::move(coroutine), owner);
 }
 
+namespace {
+
+// The coroutine is part of something that can be gone.
+[[gnu::noinline]] void resume_with_owner(WaitingJob &job) {
+  const std::shared_ptr<void> held = job.owner->hold();
+  if (!held) job.wait->cancelled = true;
+  job.wait->coroutine.resume();
+}
+
+}  // namespace
+
 sched::Outcome go_on(RunningJob &running) {
-  const Coroutine::Handle handle = running.waiting->coroutine.handle();
-  running.owner = running.waiting->owner;
-  std::shared_ptr<void> held;
-  if (running.owner != nullptr) {
-    held = running.owner->hold();
-    if (!held) running.waiting->wait->cancelled = true;
+  WaitingJob &job = *running.waiting;
+  const Coroutine::Handle handle = job.coroutine.handle();
+  running.owner = job.owner;
+  if (job.owner == nullptr) {
+    job.wait->coroutine.resume();
+  } else {
+    resume_with_owner(job);
   }
-  running.waiting->wait->coroutine.resume();
   if (!handle.done()) return sched::Outcome::Finished;
   const std::exception_ptr exception = handle.promise().exception;
   delete std::exchange(running.waiting, nullptr);

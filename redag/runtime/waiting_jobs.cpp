@@ -44,18 +44,19 @@ void WaitingJobs::add_alarm(const detail::Wait &wait) {
 
 void WaitingJobs::end(JobSlot slot, Time now) {
   WaitingJob &job = *by_slot_[slot.value];
-  if (job.wait != nullptr) end(*job.wait, slot);
+  if (job.wait != nullptr) {
+    job.wait->is_over = true;
+    if (job.wait->until != kNever) forget_alarm(*job.wait, slot);
+  }
   job.waited += std::max<Duration>(0, now - job.since);
   job.entry->most_waits = std::max(job.entry->most_waits, ++job.waits);
   job.entry->longest_waits = std::max(job.entry->longest_waits, job.waited);
 }
 
-// A wait that can have an alarm forgets it.
-void WaitingJobs::end(detail::Wait &wait, JobSlot slot) {
-  wait.is_over = true;
+// A wait with a limit has ended. If another than its alarm has ended it, the alarm is still there.
+void WaitingJobs::forget_alarm(const detail::Wait &wait, JobSlot slot) {
   const bool may_have_alarm = wait.cancelled || wait.kind == detail::Wait::Kind::Event;
-  if (may_have_alarm && wait.until != kNever &&
-      std::erase_if(sleepers_, [&](const Sleeper &sleeper) { return sleeper.job == slot; }) > 0) {
+  if (may_have_alarm && std::erase_if(sleepers_, [&](const Sleeper &sleeper) { return sleeper.job == slot; }) > 0) {
     std::make_heap(sleepers_.begin(), sleepers_.end());
   }
 }

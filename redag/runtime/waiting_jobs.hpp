@@ -118,7 +118,7 @@ class WaitingJobs {
     friend bool operator<(const Sleeper &a, const Sleeper &b) { return a.until > b.until; }
   };
   [[nodiscard]] static bool cancel(detail::Wait *wait);
-  void end(detail::Wait &wait, JobSlot slot);
+  void forget_alarm(const detail::Wait &wait, JobSlot slot);
   void add_alarm(const detail::Wait &wait);
 
   DeviceThreads &devices_;
