@@ -86,7 +86,9 @@ class TaskBody {
   TaskBody(std::nullptr_t /*none*/) {}  // NOLINT(google-explicit-constructor)
   template <class F>
   requires(!std::is_same_v<std::remove_cvref_t<F>, TaskBody> && std::is_invocable_v<F &>)
-      TaskBody(F &&body) {  // NOLINT(google-explicit-constructor): functions are passed as bodies
+      // Functions are passed as bodies.
+      // NOLINTNEXTLINE(google-explicit-constructor,bugprone-forwarding-reference-overload)
+      TaskBody(F &&body) {
     if constexpr (std::is_same_v<std::invoke_result_t<F &>, Coroutine>) {
       coroutine_ = std::forward<F>(body);
     } else {

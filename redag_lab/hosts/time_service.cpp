@@ -56,11 +56,11 @@ std::optional<Duration> number_of(std::string_view text, std::string_view suffix
   std::string number(text.substr(0, text.find_first_of(kBlank)));
   if (number.starts_with('+')) number.erase(0, 1);
   if (number.empty() || number.find_first_not_of("-.0123456789") != std::string::npos) return std::nullopt;
-  const std::size_t kDigits = suffix == "s" ? 9 : 0;
+  const std::size_t digits = suffix == "s" ? 9 : 0;
   bool is_rounded = false;
-  if (const std::size_t point = number.find('.'); point != std::string::npos && number.size() > point + 1 + kDigits) {
-    is_rounded = number.find_first_not_of('0', point + 1 + kDigits) != std::string::npos;
-    number.resize(kDigits == 0 ? point : point + 1 + kDigits);
+  if (const std::size_t point = number.find('.'); point != std::string::npos && number.size() > point + 1 + digits) {
+    is_rounded = number.find_first_not_of('0', point + 1 + digits) != std::string::npos;
+    number.resize(digits == 0 ? point : point + 1 + digits);
   }
   const bool is_negative = number.starts_with('-');
   Result<Duration> value = parse_duration(number + std::string(suffix));
