@@ -220,7 +220,7 @@ Result<RunInfo> run_info_from_json(std::string_view text, const std::string &fil
 }
 
 std::string run_header_to_json(std::string_view format, const RunInfo &info) {
-  std::string text = "{\"format\":\"" + std::string(format) + "\",";
+  std::string text = R"({"format":")" + std::string(format) + R"(",)";
   if (info.provenance.is_known()) text += "\"provenance\":" + provenance_to_json(info.provenance) + ",";
   return text + "\"run\":" + run_info_to_json(info) + "}";
 }
@@ -232,7 +232,7 @@ Result<RunInfo> run_header_from_json(std::string_view text, std::string_view for
   const Json json = Json::parse(text, nullptr, false);
   const auto given = json.is_object() ? json.find("format") : json.end();
   if (!json.is_object() || given == json.end() || *given != format || !json.contains("run")) {
-    return file_error(file, 1, wrong + "the first line must have \"format\": \"" + std::string(format) + "\"",
+    return file_error(file, 1, wrong + R"(the first line must have "format": ")" + std::string(format) + R"(")",
                       "'redag run' and 'redag simulate' write such files with --out");
   }
   Result<RunInfo> info = run_info_from_json(json["run"].dump(), file, 1);
