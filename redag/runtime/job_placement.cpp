@@ -20,7 +20,9 @@ JobPlacement::JobPlacement(WorkerPool &pool, WaitingJobs &waiting, bool os, cons
       band_(band),
       priorities_(os ? pool.size() : 0, band.top_job),
       mailboxes_(pool.size(), lookout),
-      spare_(spare) {}
+      spare_(spare) {
+  moves_.reserve(os ? pool.size() : 0);
+}
 
 void JobPlacement::start(std::size_t processors) {
   priorities_.set_processors(processors);
@@ -235,13 +237,13 @@ void JobPlacement::apply(std::span<const ThreadPriorities::Change> changes) {
 }
 
 void JobPlacement::follow_levels() {
-  std::vector<PriorityMove> moves;
+  moves_.clear();
   for (const auto &thread : pool_.threads()) {
     if (thread->stack.empty()) continue;
-    moves.push_back({thread->index, thread->level, priorities_.of(thread->index), priority_of(*thread)});
+    moves_.push_back({thread->index, thread->level, priorities_.of(thread->index), priority_of(*thread)});
   }
-  sort_without_inversion(moves);
-  for (const PriorityMove &move : moves) apply(priorities_.change(move.thread, move.to));
+  sort_without_inversion(moves_);
+  for (const PriorityMove &move : moves_) apply(priorities_.change(move.thread, move.to));
 }
 
 void JobPlacement::give_way(bool give_way) {

@@ -104,7 +104,7 @@ class JobPlacement {
   /// follow_levels(), or until the scheduler tells new levels.
   void set_levels(std::vector<int> priorities) { band_.given = std::move(priorities); }
   /// os: gives the threads that have jobs the priorities of their levels. Meanwhile no two are in another order than
-  /// before and after. Allocates.
+  /// before and after.
   void follow_levels();
   /// os: the priority of a job with this level.
   [[nodiscard]] int priority_of_level(std::uint32_t level) const { return band_.of_level(level); }
@@ -187,6 +187,7 @@ class JobPlacement {
   PriorityBand band_;
   ThreadPriorities priorities_;  // os
   Mailboxes mailboxes_;
+  std::vector<PriorityMove> moves_;  // of follow_levels()
   const std::uint32_t spare_;
   std::uint32_t blocking_ = 0;  // jobs that block, each on its thread
   std::uint32_t yielding_ = 0;  // threads that wait after Next::Kind::Yield

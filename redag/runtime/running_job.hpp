@@ -58,7 +58,7 @@ struct RunningJob {
   bool cancelled = false;           // it ended because its wait was cancelled
   bool blocks = false;              // it has lent its worker: it is in a redag::Blocking
   WaitingJob *waiting = nullptr;    // what is kept of it between its waits; null: it has not waited
-  detail::Wait *wait = nullptr;     // set by the body: what it waits for now; null: it has ended
+  detail::Wait *wait = nullptr;     // set by the body when it returns at a co_await; null: it has ended
   bool begins_coroutine = false;    // the body is in the first stretch of a coroutine
   CoroutineOwner *owner = nullptr;  // set by the body where it has one: of a coroutine that it may begin
   // Set by close():
