@@ -15,7 +15,8 @@ import sys
 
 from program import SOURCE, Case, in_terminal, main, redag
 
-# Takes processor CPU at a high real-time priority for 6 ms of every 50 ms, until it is killed.
+# Takes processor CPU at a high real-time priority for 6 ms of every 33 ms, until it is killed: it comes at another phase
+# of a period of 10 ms each time, so that some jobs are late because of it wherever it begins.
 HOG = """\
 import ctypes, os, sys, time
 os.sched_setaffinity(0, {int(sys.argv[1])})
@@ -26,7 +27,7 @@ while True:
     end = time.monotonic() + 0.006
     while time.monotonic() < end:
         pass
-    time.sleep(0.044)
+    time.sleep(0.027)
 """
 PID = """\
 name: pid
