@@ -31,8 +31,8 @@ BAD = {
 }
 FREE = {("experiment acceptance", "--name")}  # accepts any name
 SEED = "--seed"
-# A sanitized program takes a second to start, and the options share their code: some of them will do there.
-STEP = 4 if SANITIZED else 1
+# A sanitized program takes half a second to start, and the options share their code: a few of them will do there.
+STEP = 12 if SANITIZED else 1
 
 
 def options_of(command):
