@@ -20,6 +20,13 @@ namespace redag::testing {
   return options;
 }
 
+/// The same with a device, "gpu", of one slot.
+[[nodiscard]] inline runtime::ExecutorOptions one_worker_and_gpu(PreemptionMode mode = PreemptionMode::None) {
+  runtime::ExecutorOptions options = one_worker(mode);
+  options.devices = {{.name = "gpu"}};
+  return options;
+}
+
 /// A DAG whose only task, "task", runs `body` once, when the executor starts.
 [[nodiscard]] inline runtime::DagBuilder once(const std::string &name, runtime::TaskBody body,
                                               runtime::TaskOptions options = {}) {

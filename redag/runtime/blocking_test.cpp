@@ -6,11 +6,9 @@
 #include "redag/runtime/blocking.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
-#include <filesystem>
 #include <latch>
 #include <stdexcept>
 #include <string>
@@ -20,10 +18,10 @@
 #include "redag/runtime/async_event.hpp"
 #include "redag/runtime/executor.hpp"
 #include "redag/runtime/preemption_point.hpp"
-#include "redag/trace/events_file.hpp"
-#include "redag_analysis/metrics/trace_checker.hpp"
 #include "redag_testing/allocation_counter.hpp"
+#include "redag_testing/every_mode.hpp"
 #include "redag_testing/one_worker.hpp"
+#include "redag_testing/recorded_run.hpp"
 
 namespace redag::runtime {
 namespace {
@@ -38,17 +36,9 @@ ExecutorOptions with_spare_threads(PreemptionMode mode, std::uint32_t threads = 
   return options;
 }
 
-class BlockingInEveryMode : public ::testing::TestWithParam<PreemptionMode> {
- protected:
-  // The mode that `os` becomes where there are no real-time rights is tested anyway.
-  [[nodiscard]] static PreemptionMode mode() {
-    return GetParam() == PreemptionMode::Os ? PreemptionMode::Auto : GetParam();
-  }
-};
+using BlockingInEveryMode = testing::InEveryMode;
 
-INSTANTIATE_TEST_SUITE_P(, BlockingInEveryMode,
-                         ::testing::Values(PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Os),
-                         [](const auto &test) { return std::string(to_string(test.param)); });
+INSTANTIATE_TEST_SUITE_P(, BlockingInEveryMode, testing::every_mode(), testing::mode_name);
 
 // The only worker would otherwise be held for ever.
 TEST_P(BlockingInEveryMode, TheWorkerRunsAnotherJobMeanwhile) {
@@ -325,13 +315,11 @@ TEST(Blocking, NothingAllocatesInSteadyState) {
 }
 
 TEST_P(BlockingInEveryMode, TheCheckerAcceptsARecordedRun) {
-  const std::filesystem::path folder =
-      std::filesystem::temp_directory_path() / ("redag_blocking_" + std::to_string(::getpid()));
-  std::filesystem::remove_all(folder);
+  const testing::RecordedRun run;
   {
     ExecutorOptions options = with_spare_threads(mode(), 8);
     options.workers = 2;
-    options.record = folder.string();
+    options.record = run.folder().string();
     Executor executor(options);
     DagBuilder logger("logger", {.max_active = 2});
     const TaskHandle collect = logger.timer("collect", 2ms, [] {});
@@ -361,14 +349,11 @@ TEST_P(BlockingInEveryMode, TheCheckerAcceptsARecordedRun) {
     executor.add(std::move(busy));
     executor.run();
   }
-  const Result<trace::Trace> trace = trace::read_trace((folder / "events.redag").string());
-  ASSERT_TRUE(trace.has_value()) << to_string(trace.error());
-  const auto waits = std::count_if(trace->events.begin(), trace->events.end(),
+  const trace::Trace trace = run.trace();
+  const auto waits = std::count_if(trace.events.begin(), trace.events.end(),
                                    [](const JobEvent &event) { return event.kind == JobEventKind::Waits; });
   EXPECT_GE(waits, 100);
-  const metrics::CheckReport report = metrics::check_trace(*trace, metrics::rules_for(trace->info));
-  EXPECT_TRUE(report.ok()) << report.to_string();
-  std::filesystem::remove_all(folder);
+  testing::expect_right(trace);
 }
 
 }  // namespace

@@ -20,6 +20,7 @@
 #include "redag/runtime/engine.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_testing/builders.hpp"
+#include "redag_testing/every_mode.hpp"
 
 namespace redag::runtime {
 namespace {
@@ -69,9 +70,7 @@ class CoroutineEnds : public ::testing::TestWithParam<PreemptionMode> {
   std::unique_ptr<Engine> engine_;
 };
 
-INSTANTIATE_TEST_SUITE_P(Modes, CoroutineEnds,
-                         ::testing::Values(PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Os),
-                         [](const auto &instance) { return std::string(to_string(instance.param)); });
+INSTANTIATE_TEST_SUITE_P(Modes, CoroutineEnds, testing::every_mode(), testing::mode_name);
 
 struct Local {
   explicit Local(std::atomic<int> &its_count) : count(its_count) {}

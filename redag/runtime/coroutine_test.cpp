@@ -6,11 +6,9 @@
 #include "redag/runtime/coroutine.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
-#include <filesystem>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -20,9 +18,8 @@
 #include "redag/runtime/async_event.hpp"
 #include "redag/runtime/executor.hpp"
 #include "redag/runtime/preemption_point.hpp"
-#include "redag/trace/events_file.hpp"
-#include "redag_analysis/metrics/trace_checker.hpp"
 #include "redag_testing/allocation_counter.hpp"
+#include "redag_testing/every_mode.hpp"
 #include "redag_testing/one_worker.hpp"
 
 namespace redag::runtime {
@@ -31,32 +28,11 @@ namespace {
 using namespace std::chrono_literals;
 using testing::once;
 using testing::one_worker;
+using testing::one_worker_and_gpu;
 
-ExecutorOptions with_gpu(PreemptionMode mode = PreemptionMode::None) {
-  ExecutorOptions options = one_worker(mode);
-  options.devices = {{.name = "gpu"}};
-  return options;
-}
+using EveryMode = testing::InEveryMode;
 
-std::vector<JobEventKind> kinds_of(const std::vector<JobEvent> &events, TaskId task) {
-  std::vector<JobEventKind> kinds;
-  for (const JobEvent &event : events) {
-    if (event.task == task) kinds.push_back(event.kind);
-  }
-  return kinds;
-}
-
-class EveryMode : public ::testing::TestWithParam<PreemptionMode> {
- protected:
-  // The mode that `os` becomes where there are no real-time rights is tested anyway.
-  [[nodiscard]] static PreemptionMode mode() {
-    return GetParam() == PreemptionMode::Os ? PreemptionMode::Auto : GetParam();
-  }
-};
-
-INSTANTIATE_TEST_SUITE_P(Coroutines, EveryMode,
-                         ::testing::Values(PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Os),
-                         [](const auto &test) { return std::string(to_string(test.param)); });
+INSTANTIATE_TEST_SUITE_P(Coroutines, EveryMode, testing::every_mode(), testing::mode_name);
 
 // The only worker would otherwise be held for ever.
 TEST_P(EveryMode, TheWorkerRunsAnotherJobMeanwhile) {
@@ -140,97 +116,6 @@ TEST_P(EveryMode, AllSleepersWakeAndNoneEarly) {
   EXPECT_EQ(woken.load(), kSleepers);
 }
 
-TEST_P(EveryMode, ADeviceServesOneJobInEachSlot) {
-  ExecutorOptions options = with_gpu(mode());
-  options.devices[0].slots = 2;
-  Executor executor(options);
-  const DeviceHandle gpu = executor.device("gpu");
-  std::atomic<int> inside{0};
-  std::atomic<int> most{0};
-  std::atomic<int> served{0};
-  for (int i = 0; i < 5; ++i) {
-    executor.add(once("client_" + std::to_string(i), [&]() -> Coroutine {
-      for (int round = 0; round < 20; ++round) {
-        co_await gpu.run([&] {
-          const int now = ++inside;
-          for (int seen = most; seen < now && !most.compare_exchange_weak(seen, now);) {
-          }
-          std::this_thread::yield();
-          --inside;
-        });
-      }
-      if (++served == 5) executor.stop();
-    }));
-  }
-  executor.run();
-  EXPECT_EQ(served.load(), 5);
-  EXPECT_LE(most.load(), 2);
-  EXPECT_GE(most.load(), 1);
-}
-
-// The device is busy until three more jobs have asked, the least urgent first.
-std::vector<int> order_of_service(PreemptionMode mode, Device::Queue queue) {
-  ExecutorOptions options = with_gpu(mode);
-  options.devices[0].queue = queue;
-  options.policy = PolicyKind::Fixed;
-  Executor executor(options);
-  const DeviceHandle gpu = executor.device("gpu");
-  std::vector<int> order;  // the device's thread alone writes it
-  std::atomic<int> served{0};
-  std::atomic<bool> all_asked{false};
-  AsyncEvent turn[5];
-  const auto client = [&](int priority, int asks_as) {
-    return once("client_" + std::to_string(priority),
-                [&, priority, asks_as]() -> Coroutine {
-                  if (asks_as > 0) co_await turn[asks_as];
-                  turn[asks_as + 1].set();
-                  co_await gpu.run([&] {
-                    while (!all_asked) std::this_thread::sleep_for(100us);
-                    order.push_back(priority);
-                    ++served;
-                  });
-                  if (served == 4) executor.stop();
-                },
-                {.priority = priority});
-  };
-  // The only worker goes on with it once nobody else is ready: the last client has asked.
-  executor.add(once("watcher",
-                    [&]() -> Coroutine {
-                      co_await turn[4];
-                      all_asked = true;
-                    },
-                    {.priority = 0}));
-  executor.add(client(9, 0));
-  executor.add(client(1, 1));
-  executor.add(client(2, 2));
-  executor.add(client(3, 3));
-  executor.run();
-  return order;
-}
-
-// What the device is to do can own something that cannot be copied.
-TEST(Coroutine, AFunctionWithANameIsNotCopied) {
-  Executor executor(with_gpu());
-  const DeviceHandle gpu = executor.device("gpu");
-  int value = 0;
-  executor.add(once("job", [&]() -> Coroutine {
-    const auto read = [&, owned = std::make_unique<int>(7)] { value += *owned; };
-    co_await gpu.run(read);
-    co_await gpu.run(read);
-    executor.stop();
-  }));
-  executor.run();
-  EXPECT_EQ(value, 14);
-}
-
-TEST(Coroutine, ADeviceServesTheMostUrgentJobFirst) {
-  EXPECT_EQ(order_of_service(PreemptionMode::None, Device::Queue::Priority), (std::vector<int>{9, 3, 2, 1}));
-}
-
-TEST(Coroutine, ADeviceInOrderOfRequestsServesTheFirst) {
-  EXPECT_EQ(order_of_service(PreemptionMode::None, Device::Queue::Fifo), (std::vector<int>{9, 1, 2, 3}));
-}
-
 // Both jobs wait before the event that wakes them: the less urgent one asked first.
 TEST(Coroutine, AWokenJobKeepsItsPlaceInTheOrderOfJobs) {
   ExecutorOptions options = one_worker();
@@ -261,54 +146,6 @@ TEST(Coroutine, AWokenJobKeepsItsPlaceInTheOrderOfJobs) {
   EXPECT_EQ(order, (std::vector<int>{3, 2, 1}));
 }
 
-TEST_P(EveryMode, ExceptionsOfTheBodyAndOfTheDeviceAreTheJobs) {
-  ExecutorOptions options = with_gpu(mode());
-  std::vector<std::string> seen;
-  options.on_exception = [&](const ExceptionInfo &info) {
-    try {
-      std::rethrow_exception(info.exception);
-    } catch (const std::exception &exception) {
-      seen.emplace_back(exception.what());
-    }
-    return OnException::Continue;
-  };
-  Executor executor(options);
-  const DeviceHandle gpu = executor.device("gpu");
-  AsyncEvent next;
-  const DagId before = executor.add(once("before", [&]() -> Coroutine {
-    next.set();
-    throw std::runtime_error("before a wait");
-    co_return;
-  }));
-  executor.add(once("after",
-                    [&]() -> Coroutine {
-                      co_await next;
-                      co_await sleep_for(1ms);
-                      next.set();
-                      throw std::runtime_error("after a wait");
-                    },
-                    {.offset = 5ms}));
-  executor.add(once("device",
-                    [&]() -> Coroutine {
-                      co_await next;
-                      bool caught = false;
-                      try {
-                        co_await gpu.run([] { throw std::runtime_error("caught"); });
-                      } catch (const std::runtime_error &) {
-                        caught = true;
-                      }
-                      EXPECT_TRUE(caught);
-                      executor.stop();
-                      co_await gpu.run([] { throw std::runtime_error("not reached: the executor stops"); });
-                    },
-                    {.offset = 200ms}));
-  executor.run();
-  ASSERT_EQ(seen.size(), 2U);
-  EXPECT_EQ(seen[0], "before a wait");
-  EXPECT_EQ(seen[1], "after a wait");
-  EXPECT_EQ(executor.stats(before)[0].jobs.aborted, 1U);
-}
-
 Coroutine inner(int depth, std::vector<int> &order) {
   order.push_back(depth);
   co_await sleep_for(100us);
@@ -332,114 +169,6 @@ TEST(Coroutine, AwaitsOthersLikeFunctions) {
   }));
   executor.run();
   EXPECT_EQ(order, (std::vector<int>{2, 1, 0, 0}));
-}
-
-// Destroyed with its frame: tells that a body's locals are not lost.
-struct Sentinel {
-  explicit Sentinel(std::atomic<int> &its_count) : count(its_count) { ++count; }
-  ~Sentinel() { --count; }
-  Sentinel(const Sentinel &) = delete;
-  Sentinel &operator=(const Sentinel &) = delete;
-  std::atomic<int> &count;
-};
-
-// At the stop, one job sleeps, one waits for an event, one is served and one queues behind it.
-TEST_P(EveryMode, TheStopEndsWaits) {
-  ExecutorOptions options = with_gpu(mode());
-  options.workers = 2;
-  bool any_exception = false;
-  options.on_exception = [&](const ExceptionInfo &) {
-    any_exception = true;
-    return OnException::Continue;
-  };
-  options.on_deadline_miss = [&](const MissInfo &) { any_exception = true; };
-  std::atomic<int> alive{0};
-  std::atomic<int> waiting{0};
-  std::atomic<bool> served{false};
-  std::atomic<bool> queued{false};
-  std::atomic<bool> serving{false};
-  AsyncEvent never;
-  std::vector<DagId> dags;
-  {
-    Executor executor(options);
-    const DeviceHandle gpu = executor.device("gpu");
-    dags.push_back(executor.add(once("sleeps", [&]() -> Coroutine {
-      const Sentinel sentinel(alive);
-      ++waiting;
-      co_await sleep_for(1h);
-      ADD_FAILURE() << "the sleep was not over";
-    })));
-    dags.push_back(executor.add(once("waits", [&]() -> Coroutine {
-      const Sentinel sentinel(alive);
-      ++waiting;
-      try {
-        co_await never;
-      } catch (const WaitCancelled &) {
-        EXPECT_TRUE(executor.stopping());
-        throw;
-      }
-      ADD_FAILURE() << "the event was not set";
-    })));
-    dags.push_back(executor.add(once("is_served", [&]() -> Coroutine {
-      const Sentinel sentinel(alive);
-      ++waiting;
-      co_await gpu.run([&] {
-        serving = true;
-        while (!executor.stopping()) std::this_thread::sleep_for(100us);
-      });
-      served = true;  // a service is never cut off
-    })));
-    dags.push_back(executor.add(once("queues", [&]() -> Coroutine {
-      const Sentinel sentinel(alive);
-      ++waiting;
-      while (!serving) co_await sleep_for(100us);
-      queued = true;
-      co_await gpu.run([] { ADD_FAILURE() << "served after the stop"; });
-    })));
-    executor.start();
-    while (waiting < 4 || !queued) std::this_thread::sleep_for(100us);
-    std::this_thread::sleep_for(2ms);
-    executor.stop();
-    EXPECT_EQ(alive.load(), 0);
-    EXPECT_TRUE(served.load());
-    EXPECT_FALSE(any_exception);
-    for (const DagId dag : dags) {
-      const TaskStats stats = executor.stats(dag)[0];
-      EXPECT_EQ(stats.jobs.aborted, 0U) << stats.task << " is in flight";
-    }
-    EXPECT_EQ(executor.stats(dags[2])[0].jobs.finished, 1U);
-  }
-}
-
-TEST(Coroutine, ADeviceMayStopTheExecutor) {
-  Executor executor(with_gpu());
-  const DeviceHandle gpu = executor.device("gpu");
-  bool ended = false;
-  executor.add(once("job", [&]() -> Coroutine {
-    co_await gpu.run([&] { executor.stop(); });
-    ended = true;
-  }));
-  executor.run();
-  EXPECT_TRUE(ended);
-}
-
-TEST(Coroutine, ADestructorWaitsForTheDevice) {
-  std::atomic<bool> left{false};
-  {
-    Executor executor(with_gpu());
-    const DeviceHandle gpu = executor.device("gpu");
-    std::atomic<bool> serving{false};
-    executor.add(once("job", [&]() -> Coroutine {
-      co_await gpu.run([&] {
-        serving = true;
-        while (!executor.stopping()) std::this_thread::sleep_for(100us);
-      });
-      left = true;
-    }));
-    executor.start();
-    while (!serving) std::this_thread::sleep_for(100us);
-  }
-  EXPECT_TRUE(left.load());
 }
 
 // Spins until the job has used that much processor time.
@@ -467,12 +196,12 @@ TEST_P(EveryMode, ProcessorTimeCountsAcrossWaitsAndWaitsDoNot) {
 
 TEST_P(EveryMode, AJobThatHasUsedItsBudgetIsCutOffWhereItWouldWait) {
   Executor executor(one_worker(mode()));
-  std::atomic<int> alive{0};
+  const auto alive = std::make_shared<bool>();  // copied into each frame: a body's locals are not lost
   std::atomic<bool> went_on{false};
   DagBuilder dag("dag");
   dag.timer("task", 20ms,
             [&]() -> Coroutine {
-              const Sentinel sentinel(alive);
+              const auto local = alive;
               use(2ms);
               co_await sleep_for(1ms);
               use(4ms);  // more than the budget only together with what it used before
@@ -485,7 +214,7 @@ TEST_P(EveryMode, AJobThatHasUsedItsBudgetIsCutOffWhereItWouldWait) {
   while (executor.stats(id)[0].jobs.aborted < 2) std::this_thread::sleep_for(1ms);
   executor.stop();
   EXPECT_FALSE(went_on);
-  EXPECT_EQ(alive.load(), 0);
+  EXPECT_EQ(alive.use_count(), 1);
 }
 
 TEST(Coroutine, APreemptionPointCutsOffAfterAWait) {
@@ -602,7 +331,7 @@ TEST(Coroutine, TheWatchdogReportsAJobThatWaitsForEver) {
 }
 
 TEST(Coroutine, NothingAllocatesInSteadyState) {
-  Executor executor(with_gpu());
+  Executor executor(one_worker_and_gpu());
   const DeviceHandle gpu = executor.device("gpu");
   AsyncEvent event;
   int jobs = 0;
@@ -623,95 +352,6 @@ TEST(Coroutine, NothingAllocatesInSteadyState) {
   executor.add(std::move(dag));
   executor.run();
   EXPECT_EQ(after, before);
-}
-
-TEST_P(EveryMode, EventsSayWhenAJobWaited) {
-  ExecutorOptions options = with_gpu(mode());
-  options.trace_capacity = 1000;
-  Executor executor(options);
-  const DeviceHandle gpu = executor.device("gpu");
-  DagBuilder dag("dag");
-  const TaskHandle job = dag.timer("job", 1h, [&]() -> Coroutine {
-    co_await gpu.run([] {});
-    co_await sleep_for(1ms);
-  });
-  dag.data("end", {job}, [&] { executor.stop(); });
-  executor.add(std::move(dag));
-  executor.run();
-  std::vector<JobEvent> events;
-  executor.drain(events);
-  using enum JobEventKind;
-  EXPECT_EQ(kinds_of(events, TaskId(0)),
-            (std::vector<JobEventKind>{Released, Ready, Dispatched, Started, Waits, Served, Woken, Resumed, Waits,
-                                       Woken, Resumed, Executed, Finished}));
-}
-
-TEST_P(EveryMode, TheCheckerAcceptsARecordedRun) {
-  const std::filesystem::path folder =
-      std::filesystem::temp_directory_path() / ("redag_waits_" + std::to_string(::getpid()));
-  std::filesystem::remove_all(folder);
-  {
-    ExecutorOptions options = with_gpu(mode());
-    options.workers = 2;
-    options.record = folder.string();
-    Executor executor(options);
-    const DeviceHandle gpu = executor.device("gpu");
-    DagBuilder camera("camera", {.max_active = 2});
-    const TaskHandle grab = camera.timer("grab", 2ms, [] {});
-    camera.data("detect", {grab}, [&]() -> Coroutine { co_await gpu.run([] { std::this_thread::sleep_for(300us); }); },
-                {.group = "state"});
-    executor.add(std::move(camera));
-    DagBuilder control("control");
-    int jobs = 0;
-    control.timer("step", 1ms,
-                  [&]() -> Coroutine {
-                    co_await sleep_for(50us);
-                    if (++jobs == 100) executor.stop();
-                  },
-                  {.group = "state"});
-    executor.add(std::move(control));
-    executor.run();
-  }
-  const Result<trace::Trace> trace = trace::read_trace((folder / "events.redag").string());
-  ASSERT_TRUE(trace.has_value()) << to_string(trace.error());
-  ASSERT_EQ(trace->info.workload.platform.devices.size(), 1U);
-  EXPECT_EQ(trace->info.workload.platform.devices[0].name, "gpu");
-  const Task &detect = trace->info.workload.dags[0].tasks[1];
-  ASSERT_EQ(detect.waits.size(), 1U) << "measured, as its wcet is";
-  EXPECT_GE(detect.waits[0].longest, 300 * kMicrosecond);
-  EXPECT_TRUE(trace->info.workload.dags[0].tasks[0].waits.empty());
-  const auto waits = std::count_if(trace->events.begin(), trace->events.end(),
-                                   [](const JobEvent &event) { return event.kind == JobEventKind::Waits; });
-  EXPECT_GE(waits, 100);
-  const metrics::CheckReport report = metrics::check_trace(*trace, metrics::rules_for(trace->info));
-  EXPECT_TRUE(report.ok()) << report.to_string();
-  std::filesystem::remove_all(folder);
-}
-
-TEST(Coroutine, WrongDevicesAreRefused) {
-  ExecutorOptions options = with_gpu();
-  Executor other(options);
-  Executor executor(options);
-  EXPECT_THROW(static_cast<void>(executor.device("dla")), std::out_of_range);
-  const DeviceHandle gpu = other.device("gpu");
-  bool refused = false;
-  executor.add(once("job", [&]() -> Coroutine {
-    try {
-      co_await gpu.run([] {});
-    } catch (const std::logic_error &) {
-      refused = true;
-    }
-    executor.stop();
-  }));
-  executor.run();
-  EXPECT_TRUE(refused);
-
-  options.devices.push_back({.name = "gpu"});
-  EXPECT_THROW(Executor{options}, std::invalid_argument) << "two of one name";
-  options.devices = {{.name = "gpu", .slots = 0}};
-  EXPECT_THROW(Executor{options}, std::invalid_argument);
-  options.devices = {{.name = ""}};
-  EXPECT_THROW(Executor{options}, std::invalid_argument);
 }
 
 }  // namespace

@@ -21,6 +21,7 @@
 #include "redag/runtime/running_job.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_testing/builders.hpp"
+#include "redag_testing/every_mode.hpp"
 #include "redag_testing/stepped_clock.hpp"
 
 namespace {
@@ -98,9 +99,7 @@ class EngineClock : public ::testing::TestWithParam<PreemptionMode> {
   const PriorityBand band_ = probe_priority_band();
   std::unique_ptr<Engine> engine_;
 };
-INSTANTIATE_TEST_SUITE_P(Modes, EngineClock,
-                         ::testing::Values(PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Os),
-                         [](const auto &instance) { return std::string(to_string(instance.param)); });
+INSTANTIATE_TEST_SUITE_P(Modes, EngineClock, testing::every_mode(), testing::mode_name);
 
 TEST_P(EngineClock, ShortJobsAskForNoProcessorTime) {
   start({{.name = "t", .period = 1000}}, {[](const Job &) {

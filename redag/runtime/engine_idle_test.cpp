@@ -16,6 +16,7 @@
 #include "redag/runtime/threads.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_testing/builders.hpp"
+#include "redag_testing/every_mode.hpp"
 
 namespace redag::runtime {
 namespace {
@@ -67,9 +68,7 @@ class Leader : public ::testing::TestWithParam<PreemptionMode> {
   ReleaseThread releases_{[this] { return expire(); }};
 };
 
-INSTANTIATE_TEST_SUITE_P(Modes, Leader,
-                         ::testing::Values(PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Os),
-                         [](const auto &instance) { return std::string(to_string(instance.param)); });
+INSTANTIATE_TEST_SUITE_P(Modes, Leader, testing::every_mode(), testing::mode_name);
 
 // The release thread is not started: no other thread releases the job.
 TEST_P(Leader, RunsTheJobThatItReleases) {

@@ -17,6 +17,7 @@
 #include "redag/runtime/threads.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_testing/builders.hpp"
+#include "redag_testing/every_mode.hpp"
 
 namespace redag::runtime {
 namespace {
@@ -58,9 +59,7 @@ class ShortJobs : public ::testing::TestWithParam<PreemptionMode> {
   const PriorityBand band_ = probe_priority_band();
   std::unique_ptr<Engine> engine_;
 };
-INSTANTIATE_TEST_SUITE_P(Modes, ShortJobs,
-                         ::testing::Values(PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Os),
-                         [](const auto &instance) { return std::string(to_string(instance.param)); });
+INSTANTIATE_TEST_SUITE_P(Modes, ShortJobs, testing::every_mode(), testing::mode_name);
 
 TEST_P(ShortJobs, OneThatSleepsAllTheSameIsNotChargedForIt) {
   std::atomic<bool> sleeps{false};
@@ -111,8 +110,7 @@ TEST_P(ShortJobs, AJobIsNotChargedForTheOneBefore) {
 
 // Only `os` changes priorities.
 class ShortJobsWithPriorities : public ShortJobs {};
-INSTANTIATE_TEST_SUITE_P(Modes, ShortJobsWithPriorities, ::testing::Values(PreemptionMode::Os),
-                         [](const auto &instance) { return std::string(to_string(instance.param)); });
+INSTANTIATE_TEST_SUITE_P(Modes, ShortJobsWithPriorities, ::testing::Values(PreemptionMode::Os), testing::mode_name);
 
 // The thread of job 2 keeps the priority of the job of 0 before it. A job of 1 lies in between, and must not wait for
 // 2.

@@ -16,6 +16,7 @@
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_testing/allocation_counter.hpp"
 #include "redag_testing/builders.hpp"
+#include "redag_testing/every_mode.hpp"
 
 namespace redag::runtime {
 namespace {
@@ -112,9 +113,7 @@ class EngineInEveryMode : public ::testing::TestWithParam<PreemptionMode> {
     }
   }
 };
-INSTANTIATE_TEST_SUITE_P(Modes, EngineInEveryMode,
-                         ::testing::Values(PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Os),
-                         [](const auto &instance) { return std::string(to_string(instance.param)); });
+INSTANTIATE_TEST_SUITE_P(Modes, EngineInEveryMode, testing::every_mode(), testing::mode_name);
 
 TEST_P(EngineInEveryMode, OneWorkerTakesTheMostUrgentJobFirst) {
   Bench bench(ladder(4), GetParam(), 1);

@@ -21,6 +21,7 @@
 #include "redag_analysis/metrics/summary.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"
 #include "redag_testing/one_worker.hpp"
+#include "redag_testing/recorded_run.hpp"
 
 namespace redag::runtime {
 namespace {
@@ -28,33 +29,18 @@ namespace {
 using namespace std::chrono_literals;
 namespace fs = std::filesystem;
 
-// Each test has a folder of its own, which goes with it.
 class Record : public ::testing::Test {
  protected:
-  Record()
-      : folder_(fs::temp_directory_path() / ("redag_record_" + std::to_string(::getpid()) + "_" +
-                                             ::testing::UnitTest::GetInstance()->current_test_info()->name())) {
-    fs::remove_all(folder_);
-  }
-  ~Record() override { fs::remove_all(folder_); }
-
   [[nodiscard]] ExecutorOptions recording(PreemptionMode mode = PreemptionMode::None) const {
     ExecutorOptions options = testing::one_worker(mode);
     options.name = "robot";
     options.record = folder_.string();
     return options;
   }
-  [[nodiscard]] trace::Trace trace() const {
-    Result<trace::Trace> read = trace::read_trace((folder_ / "events.redag").string());
-    if (!read) throw std::runtime_error(to_string(read.error()));
-    return *std::move(read);
-  }
-  static void expect_right(const trace::Trace &trace) {
-    const metrics::CheckReport report = metrics::check_trace(trace, metrics::rules_for(trace.info));
-    EXPECT_TRUE(report.ok()) << report.to_string();
-  }
+  [[nodiscard]] trace::Trace trace() const { return run_.trace(); }
 
-  fs::path folder_;
+  testing::RecordedRun run_;
+  const fs::path &folder_ = run_.folder();
 };
 
 TEST_F(Record, ARunBecomesATraceThatTheCheckerAccepts) {
@@ -76,7 +62,7 @@ TEST_F(Record, ARunBecomesATraceThatTheCheckerAccepts) {
       EXPECT_FALSE(fs::exists(folder_ / "flight"));
     }
     const trace::Trace recorded = trace();
-    expect_right(recorded);
+    testing::expect_right(recorded);
     EXPECT_EQ(recorded.info.lost_events, 0U);
     EXPECT_EQ(recorded.info.workload.name, "robot");
     ASSERT_EQ(recorded.info.workload.dags.size(), 1U);
@@ -118,7 +104,7 @@ TEST_F(Record, DagsThatComeAndGoAndEventsAreInIt) {
     executor.wait();
   }
   const trace::Trace recorded = trace();
-  expect_right(recorded);
+  testing::expect_right(recorded);
   EXPECT_EQ(recorded.info.event_tasks, std::vector<TaskId>{TaskId(0)});
   ASSERT_EQ(recorded.info.workload.dags.size(), 6U);
   EXPECT_EQ(recorded.info.workload.dags[2].name, "inspection");
@@ -166,7 +152,7 @@ TEST_F(Record, AKilledProcessLeavesARecordThatCanBeRecovered) {
   ASSERT_TRUE(WIFSIGNALED(status));
   const Result<trace::Recovered> recovered = trace::recover((folder_ / "flight").string());
   ASSERT_TRUE(recovered) << to_string(recovered.error());
-  expect_right(recovered->trace);
+  testing::expect_right(recovered->trace);
   EXPECT_GT(metrics::summarize(recovered->trace).tasks[0].jobs.finished, 100U);
 }
 
