@@ -6,6 +6,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
@@ -21,23 +22,25 @@ struct Contender {
   std::function<std::unique_ptr<rclcpp::Executor>()> make;
 };
 
-inline std::unique_ptr<rclcpp::Executor> make_redag(redag::PreemptionMode mode, bool raise_middleware = true) {
+inline std::unique_ptr<rclcpp::Executor> make_redag(redag::PreemptionMode mode, std::uint32_t workers,
+                                                    bool raise_middleware = true) {
   ReDAGOptions options;
+  options.workers = workers;
   options.preemption = mode;
   options.raise_middleware = raise_middleware;
   return std::make_unique<ReDAGExecutor>(options);
 }
 
-/// All contenders, with two threads or workers where they can have more than one.
-inline std::vector<Contender> contenders() {
+/// All contenders, with this many threads or workers where they can have more than one.
+inline std::vector<Contender> contenders(std::uint32_t workers = 2) {
   std::vector<Contender> all;
   for (const std::string &name : peer_names()) {
-    if (check_peer(name)) all.push_back({name, [name] { return make_peer(name, 2); }});
+    if (check_peer(name)) all.push_back({name, [=] { return make_peer(name, workers); }});
   }
-  all.push_back({"redag-none", [] { return make_redag(redag::PreemptionMode::None); }});
-  all.push_back({"redag-coop", [] { return make_redag(redag::PreemptionMode::Cooperative); }});
+  all.push_back({"redag-none", [=] { return make_redag(redag::PreemptionMode::None, workers); }});
+  all.push_back({"redag-coop", [=] { return make_redag(redag::PreemptionMode::Cooperative, workers); }});
   if (redag::runtime::probe_priority_band().top_job > 0) {
-    all.push_back({"redag-os", [] { return make_redag(redag::PreemptionMode::Os); }});
+    all.push_back({"redag-os", [=] { return make_redag(redag::PreemptionMode::Os, workers); }});
   }
   return all;
 }

@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Compares the latency and cost of executors: ReDAGExecutor in each preemption mode, and its peers
-// (peers.hpp). The executors take turns in one process, round by round. Prints a table of medians over the
-// rounds.
+// (peers.hpp). The executors take turns in one process, round by round. Prints medians over the rounds, and in brackets
+// the least and the most of them.
 //
-//   ros2 run redag_rclcpp_lab bench_executors [--rounds 5] [--seconds 1] [--only timer_idle,...]
+//   ros2 run redag_rclcpp_lab bench_executors [--rounds 5] [--seconds 1] [--workers 2] [--only timer_idle,...]
 //       [--executors mte,redag-none,...]
 #include <sched.h>
 #include <sys/resource.h>
@@ -108,15 +108,20 @@ Figures timer_lateness(rclcpp::Executor &executor, double seconds, nanoseconds p
     background.emplace(*node, slow, first, load.count() / 6 * 10, [load](std::int64_t) { burn(load); });
   }
   executor.add_node(node);
+  double used = 0;
   {
     Spinning spinning(executor);
+    const double before = cpu_seconds();
     std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+    used = cpu_seconds() - before;
   }
   executor.remove_node(node);
   const auto called = static_cast<double>(lateness.values.size());
-  return {{"p50_us", lateness.at(0.5)},
-          {"p99_us", lateness.at(0.99)},
-          {"lost_%", 100.0 * (1.0 - called / static_cast<double>(last_point + 1))}};
+  Figures figures{{"p50_us", lateness.at(0.5)},
+                  {"p99_us", lateness.at(0.99)},
+                  {"lost_%", 100.0 * (1.0 - called / static_cast<double>(last_point + 1))}};
+  if (load == 0ns) figures["cpu_s_per_10k"] = used / called * 1e4;
+  return figures;
 }
 
 // Latency from publish() to the start of the callback, at 500 Hz.
@@ -252,43 +257,77 @@ bool is_listed(const std::string &name, const std::string &names) {
   return names.empty() || ("," + names + ",").find("," + name + ",") != std::string::npos;
 }
 
+struct Options {
+  int rounds = 5;
+  double seconds = 1;
+  std::uint32_t workers = 2;
+  std::string only;
+  std::string executors;
+};
+
+std::optional<Options> parse(int argc, char **argv) {
+  Options options;
+  for (int i = 1; i < argc; i += 2) {
+    const std::string name = argv[i];
+    const char *const value = i + 1 < argc ? argv[i + 1] : nullptr;
+    if (value == nullptr) return std::nullopt;
+    if (name == "--rounds") {
+      options.rounds = std::atoi(value);
+    } else if (name == "--seconds") {
+      options.seconds = std::atof(value);
+    } else if (name == "--workers") {
+      options.workers = static_cast<std::uint32_t>(std::max(0, std::atoi(value)));
+    } else if (name == "--only") {
+      options.only = value;
+    } else if (name == "--executors") {
+      options.executors = value;
+    } else {
+      return std::nullopt;
+    }
+  }
+  if (options.rounds < 1 || options.seconds <= 0 || options.workers < 1) return std::nullopt;
+  return options;
+}
+
 }  // namespace
 
 int main(int argc, char **argv) {
   if (argc == 3 && std::string(argv[1]) == "--publish") return publish_for(std::atof(argv[2]));
-  int rounds = 5;
-  double seconds = 1;
-  std::string only;
-  std::string executors;
-  for (int i = 1; i + 1 < argc; i += 2) {
-    const std::string option = argv[i];
-    if (option == "--rounds") rounds = std::atoi(argv[i + 1]);
-    if (option == "--seconds") seconds = std::atof(argv[i + 1]);
-    if (option == "--only") only = argv[i + 1];
-    if (option == "--executors") executors = argv[i + 1];
+  const std::optional<Options> options = parse(argc, argv);
+  if (!options) {
+    std::string names;
+    for (const Measurement &measurement : measurements()) names += (names.empty() ? "" : ",") + measurement.name;
+    std::fprintf(stderr,
+                 "usage: %s [--rounds 5] [--seconds 1] [--workers 2] [--only %s] [--executors mte,redag-none,...]\n",
+                 argv[0], names.c_str());
+    return 2;
   }
   rclcpp::init(0, nullptr);
   rclcpp::get_logger("redag_rclcpp").set_level(rclcpp::Logger::Level::Error);
   for (const Measurement &measurement : measurements()) {
-    auto all = contenders();
+    if (!is_listed(measurement.name, options->only)) continue;
+    auto all = contenders(options->workers);
     if (measurement.name == "arrivals_loaded" && all.back().name == "redag-os") {
-      all.push_back(
-          {"redag-os-not-raised", [] { return redag_rclcpp::lab::make_redag(redag::PreemptionMode::Os, false); }});
+      all.push_back({"redag-os-not-raised", [&] {
+                       return redag_rclcpp::lab::make_redag(redag::PreemptionMode::Os, options->workers, false);
+                     }});
     }
-    if (!is_listed(measurement.name, only)) continue;
-    std::erase_if(all, [&](const Contender &kind) { return !is_listed(kind.name, executors); });
+    std::erase_if(all, [&](const Contender &kind) { return !is_listed(kind.name, options->executors); });
     std::map<std::string, std::map<std::string, std::vector<double>>> results;  // by figure, then by executor
-    for (int round = 0; round < rounds; ++round) {
+    for (int round = 0; round < options->rounds; ++round) {
       for (const Contender &kind : all) {
         const auto executor = kind.make();
-        for (const auto &[figure, value] : measurement.run(*executor, seconds))
+        for (const auto &[figure, value] : measurement.run(*executor, options->seconds))
           results[figure][kind.name].push_back(value);
       }
     }
     std::printf("%s\n", measurement.name.c_str());
     for (auto &[figure, by_kind] : results) {
       std::printf("  %-14s", figure.c_str());
-      for (const Contender &kind : all) std::printf("  %s %.3g", kind.name.c_str(), median(by_kind[kind.name]));
+      for (const Contender &kind : all) {
+        const auto [least, most] = std::minmax_element(by_kind[kind.name].begin(), by_kind[kind.name].end());
+        std::printf("  %s %.3g (%.3g to %.3g)", kind.name.c_str(), median(by_kind[kind.name]), *least, *most);
+      }
       std::printf("\n");
     }
     std::fflush(stdout);
