@@ -58,10 +58,7 @@ class Reader : private yaml::ValueReader {
               "write 0 for an overhead that the machine does not have");
         continue;
       }
-      const std::optional<Duration> read = duration(*value, name);
-      if (!read) continue;
-      if (*read < 0) error(*value, fmt::format("{} is negative", name));
-      *overhead_named(overheads, name) = *read;
+      *overhead_named(overheads, name) = duration_from_zero(*value, name).value_or(0);
     }
     for (const std::string_view name : {"stall_per_second", "noise_per_second"}) {
       if (*overhead_named(overheads, name) >= kSecond)

@@ -104,6 +104,15 @@ std::optional<Duration> ValueReader::positive_duration(const Node &node, std::st
   return value;
 }
 
+std::optional<Duration> ValueReader::duration_from_zero(const Node &node, std::string_view key) {
+  std::optional<Duration> value = duration(node, key);
+  if (value && *value < 0) {
+    error(node, fmt::format("{} must not be negative, not {}", key, describe(node)));
+    value.reset();
+  }
+  return value;
+}
+
 std::optional<std::string> ValueReader::text(const Node &node, std::string_view key) {
   if (node.kind != Node::Kind::Scalar || node.text.empty()) {
     wrong_type(node, key, "a non-empty string");

@@ -48,6 +48,7 @@ class ValueReader {
 
   std::optional<Duration> duration(const Node &node, std::string_view key);
   std::optional<Duration> positive_duration(const Node &node, std::string_view key);
+  std::optional<Duration> duration_from_zero(const Node &node, std::string_view key);
   /// Reads a name; see name_mistake().
   std::optional<std::string> text(const Node &node, std::string_view key);
   /// Reads processors, ascending: a text for parse_cpu_list(), or a list of such texts.

@@ -67,7 +67,7 @@ class HostsReader : private yaml::ValueReader {
       if (const auto given = text(*rate, "rate")) host.clock.rate = value_of(*rate, parse_rate(*given));
     }
     if (const Node *extra = find(node, "uncertainty")) {
-      host.clock.extra = not_negative(*extra, "uncertainty");
+      host.clock.extra = duration_from_zero(*extra, "uncertainty").value_or(0);
       if (host.clock.extra > kMostOffset) error(*extra, "the uncertainty is more than a day");
     }
     list_.hosts.push_back(std::move(host));
@@ -83,16 +83,8 @@ class HostsReader : private yaml::ValueReader {
     }
     link.from = text(*find(node, "from"), "from").value_or("");
     link.to = text(*find(node, "to"), "to").value_or("");
-    link.transport = not_negative(*find(node, "transport"), "transport");
+    link.transport = duration_from_zero(*find(node, "transport"), "transport").value_or(0);
     list_.links.push_back(std::move(link));
-  }
-
-  // Reads a duration; 0 after a mistake.
-  Duration not_negative(const Node &node, std::string_view key) {
-    const Duration value = duration(node, key).value_or(0);
-    if (value >= 0) return value;
-    error(node, fmt::format("{} must not be negative", key));
-    return 0;
   }
 
   // Reads a text, or a list of texts.

@@ -289,9 +289,9 @@ class RobotReader : private yaml::ValueReader {
       return;
     }
     const auto task = [this](const Node &at, auto key) { return read_task(at, key); };
-    const bool is_read =
-        take(node, "from", link.from, task) && take(node, "to", link.to, task) &&
-        take(node, "transport", link.transport, [this](const Node &at, auto key) { return duration(at, key); });
+    const auto time = [this](const Node &at, auto key) { return duration_from_zero(at, key); };
+    const bool is_read = take(node, "from", link.from, task) && take(node, "to", link.to, task) &&
+                         take(node, "transport", link.transport, time);
     if (!is_read) return;
     if (!check_link(node, link)) return;
     robot_.links.push_back(std::move(link));

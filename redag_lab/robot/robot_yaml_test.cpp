@@ -140,6 +140,8 @@ TEST(RobotYaml, RefusesLinksThatReleaseNothing) {
   EXPECT_EQ(findings(with_link("{from: a.d.t, to: b.d.u}", receiver)),
             "cart.yaml:7:5: error: the link has no 'transport' (write {from: PROCESS.DAG.TASK, to: PROCESS.DAG.TASK, "
             "transport: TIME})");
+  EXPECT_EQ(findings(with_link("{from: a.d.t, to: b.d.u, transport: -5us}", receiver)),
+            "cart.yaml:7:41: error: transport must not be negative, not '-5us'");
   EXPECT_EQ(findings(with_link("{from: a.d.x, to: b.d.u, transport: 0}", receiver)),
             "cart.yaml:7:12: error: there is no task 'a.d.x' (did you mean 'a.d.s'?)");
   EXPECT_EQ(findings(with_link("{from: b.d.u, to: a.d.t, transport: 0}", receiver)),
