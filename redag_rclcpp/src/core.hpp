@@ -69,7 +69,7 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
   [[nodiscard]] const TaskTable &tasks() const { return tasks_; }
   [[nodiscard]] std::vector<std::string> warnings() const;
   [[nodiscard]] std::vector<Deadlock> deadlocks() const { return notes_.deadlocks(); }
-  [[nodiscard]] bool learning_done() const { return !learning_; }
+  [[nodiscard]] bool learning_done() const { return options_.learn.count() <= 0 || learned_; }
   void set_live_bounds(std::map<std::string, redag::Duration> bounds) { notes_.set_live_bounds(std::move(bounds)); }
   [[nodiscard]] redag::trace::RunInfo run_info(std::vector<std::uint32_t> &positions) const;
 
@@ -123,6 +123,7 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
 
   std::atomic<bool> direct_{false};
   std::atomic<bool> learning_{false};
+  std::atomic<bool> learned_{false};  // the window is over, and callbacks have their rates
   redag::Time learn_until_ = redag::kNever;
   redag::Time report_unmatched_at_ = redag::kNever;
   redag::Time look_at_middleware_at_ = redag::kNever;
