@@ -85,6 +85,9 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
   void entities_changed() override;
   [[nodiscard]] bool learning() const override { return learning_; }
   void let_wait() override;
+  [[nodiscard]] std::shared_ptr<Callback> find_in_group(redag::TaskId member, const void *entity) const override {
+    return tasks_.find_in_group(member, entity);
+  }
   [[nodiscard]] redag::runtime::DeviceHandle device(const std::string &name) const override;
 
  private:
