@@ -85,17 +85,18 @@ std::shared_ptr<void> Report::value() const {
   return state_->value;
 }
 
-// The job handles what arrives for the client where the client's callback cannot, as long as it needs more.
-redag::Coroutine Report::wait(steady_clock::time_point until) {
+// The frame holds the report, because what awaits it can be destroyed first, for example when a budget cuts the job
+// off. The job handles what arrives for the client where the client's callback cannot, as long as it needs more.
+redag::Coroutine Report::wait(std::shared_ptr<Report> report, steady_clock::time_point until) {
   redag::AsyncEvent event;
-  const Waiter waiter(*state_, event);
+  const Waiter waiter(*report->state_, event);
   StandIn stand_in(this_callback(), event);
   for (bool was_set = false;;) {
-    if (!was_set) stand_in.look_for(static_cast<const rclcpp::Waitable *>(existing(client_).get()));
-    while (!is_set() && stand_in.handle_one()) {
+    if (!was_set) stand_in.look_for(static_cast<const rclcpp::Waitable *>(existing(report->client_).get()));
+    while (!report->is_set() && stand_in.handle_one()) {
     }
     const steady_clock::time_point now = steady_clock::now();
-    if (is_set() || now >= until) co_return;
+    if (report->is_set() || now >= until) co_return;
     was_set = co_await event.wait_until(std::min(until, now + kLookAgain));
   }
 }

@@ -47,7 +47,8 @@ class Report {
   [[nodiscard]] std::shared_ptr<void> value() const;
 
   /// Waits until it is set, or `until` has passed. Throws std::runtime_error if the client is destroyed meanwhile.
-  [[nodiscard]] redag::Coroutine wait(std::chrono::steady_clock::time_point until);
+  [[nodiscard]] static redag::Coroutine wait(std::shared_ptr<Report> report,
+                                             std::chrono::steady_clock::time_point until);
 
  private:
   class Waiter;
@@ -76,7 +77,7 @@ class GoalResult : public Awaitable<GoalResult<Action>> {
   GoalResult(std::shared_ptr<Report> report, std::chrono::steady_clock::time_point until)
       : report_(std::move(report)), until_(until) {}
 
-  [[nodiscard]] redag::Coroutine run() { return report_->wait(until_); }
+  [[nodiscard]] redag::Coroutine run() { return Report::wait(report_, until_); }
   [[nodiscard]] std::shared_ptr<const Wrapped> result() {
     return std::static_pointer_cast<const Wrapped>(report_->value());
   }
@@ -97,7 +98,7 @@ class CancelGoal : public Awaitable<CancelGoal<Action>> {
 
   [[nodiscard]] redag::Coroutine run() {
     send();
-    return report_->wait(until_);
+    return Report::wait(report_, until_);
   }
   [[nodiscard]] std::shared_ptr<Response> result() { return std::static_pointer_cast<Response>(report_->value()); }
 
@@ -196,13 +197,13 @@ class SendGoal : public Awaitable<SendGoal<Action>> {
   [[nodiscard]] redag::Coroutine run() {
     // A goal that is accepted after this wait is cancelled.
     const struct Abandon {
-      ~Abandon() { answer.abandon(); }
-      Report &answer;
-    } abandon{*answer_};
+      ~Abandon() { answer->abandon(); }
+      std::shared_ptr<Report> answer;
+    } abandon{answer_};
     co_await wait_for_server(client_, until_);
     if (std::chrono::steady_clock::now() >= until_) co_return;
     send();
-    co_await answer_->wait(until_);
+    co_await Report::wait(answer_, until_);
   }
   [[nodiscard]] Goal<Action> result() {
     if (!answer_->is_set()) return Goal<Action>(GoalAnswer::None);
