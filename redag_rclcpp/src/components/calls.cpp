@@ -59,8 +59,8 @@ class Planner : public rclcpp::Node {
       RCLCPP_WARN(get_logger(), "no map within a second");
       co_return;
     }
-    RCLCPP_INFO_ONCE(get_logger(), "plans with %s of %s m", response->message.c_str(),
-                     values->front().value_to_string().c_str());
+    RCLCPP_INFO_ONCE(get_logger(), "plans with %s, cells of %.2f m", response->message.c_str(),
+                     values->front().as_double());
   }
 
   rclcpp::Client<Trigger>::SharedPtr client_;
