@@ -92,6 +92,7 @@ struct StartedJob {
   Job job;
   std::uint32_t thread = 0;  // index among the engine's threads
   bool on_top = false;       // of its thread: the others there wait until it ends
+  bool lends = false;        // it has lent its worker: it is in a redag::Blocking
   // Of the topmost job whose body the thread is in; otherwise kNever and 0:
   Time begun = kNever;      // on the engine's clock
   Duration thread_cpu = 0;  // processor time of the thread since it was created
@@ -205,8 +206,9 @@ class Engine {
   [[nodiscard]] Time halted_at() const;  // relative to the origin; kNever before halt()
   /// Jobs that have started and not ended.
   [[nodiscard]] std::vector<Job> started() const;
-  /// Between start() and join(): replaces `out` by the jobs on the threads, by thread, the topmost one last. For
-  /// observers that look from time to time; leaves out the job of run_one(), and those that wait.
+  /// Between start() and join(): replaces `out` by the jobs on the threads, by thread, the topmost one last, and then
+  /// those that block on threads of their own. For observers that look from time to time; leaves out the job of
+  /// run_one(), and those that wait without a thread.
   void started(std::vector<StartedJob> &out) const;
   /// Calls halt(), and ends the threads once all started jobs have ended. Not from a body.
   void join();

@@ -6,6 +6,7 @@
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/engine.hpp"
 #include "redag/runtime/running_job.hpp"
+#include "redag/runtime/waiting_jobs.hpp"
 
 namespace redag::runtime {
 namespace {
@@ -30,6 +31,10 @@ void Engine::started(std::vector<StartedJob> &out) const {
       const RunningJob *running = thread->top.load(std::memory_order_acquire);
       if (running != nullptr && running->slot == topmost.job.slot) topmost.begun = running->begun;
     }
+    waiting_.for_each([&](const WaitingJob &job) {
+      if (job.thread == nullptr) return;
+      out.push_back({.job = job.job, .thread = job.thread->index, .on_top = true, .lends = true, .begun = job.begun});
+    });
   }
   for (StartedJob &started : out) {
     if (started.begun == kNever) continue;

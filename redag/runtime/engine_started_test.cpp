@@ -9,6 +9,7 @@
 #include <memory>
 #include <vector>
 
+#include "redag/runtime/blocking.hpp"
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/engine.hpp"
 #include "redag/runtime/preemption_point.hpp"
@@ -75,6 +76,43 @@ TEST(EngineStarted, AJobThatRunsOnTopOfAnotherIsTheLastOfItsThread) {
   goes_on.set();
   engine.halt();
   EXPECT_TRUE(engine.wait_idle(kNever));
+  engine.started(started);
+  EXPECT_TRUE(started.empty());
+  engine.join();
+}
+
+TEST(EngineStarted, AJobThatBlocksInAScopeIsOneOfThem) {
+  const Workload workload = ladder(1);
+  EngineOptions options;
+  options.config.policy = workload.policy;
+  options.spare_threads = 1;
+  Engine engine(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
+  Event blocks;
+  Event goes_on;
+  std::atomic<int> thread{0};
+  engine.bind(workload, {[&](const Job &) {
+                thread = gettid();
+                const redag::Blocking scope;
+                EXPECT_TRUE(scope.lends());
+                blocks.set();
+                goes_on.wait();
+                return Outcome::Finished;
+              }});
+  ASSERT_TRUE(engine.start());
+  engine.set_origin(monotonic_now());
+  engine.release(TaskId(0), 0);
+  blocks.wait();
+  std::vector<StartedJob> started;
+  engine.started(started);
+  goes_on.set();
+  engine.halt();
+  EXPECT_TRUE(engine.wait_idle(kNever));
+  ASSERT_EQ(started.size(), 1U);
+  EXPECT_EQ(started[0].job.task, TaskId(0));
+  EXPECT_TRUE(started[0].on_top);
+  EXPECT_TRUE(started[0].lends);
+  EXPECT_EQ(started[0].thread_id, thread);
+  EXPECT_GT(started[0].begun, 0);
   engine.started(started);
   EXPECT_TRUE(started.empty());
   engine.join();

@@ -37,6 +37,10 @@ std::shared_ptr<ExecutorContext> Callback::context_now() const {
 
 redag::runtime::DeviceHandle Callback::device(const std::string &name) const { return context_now()->device(name); }
 
+std::shared_ptr<Callback> Callback::in_own_group(const void *entity) const {
+  return context_now()->find_in_group(task(), entity);
+}
+
 void Callback::let_wait() const {
   const std::shared_ptr<ExecutorContext> context = context_now();
   if (!context->direct()) {
@@ -51,6 +55,15 @@ void Callback::let_wait() const {
 void Callback::coroutine_ended() {
   redag::runtime::RunningJob &running = *redag::runtime::RunningJob::current();
   if (running.waiting != nullptr) count_job(running, running.waiting->job.release);
+}
+
+Callback &this_callback() {
+  const redag::runtime::RunningJob *const running = redag::runtime::RunningJob::current();
+  auto *const callback = running == nullptr ? nullptr : dynamic_cast<Callback *>(running->owner);
+  if (callback != nullptr) return *callback;
+  throw std::logic_error(
+      "redag_rclcpp::coroutine(): the callback runs in no ReDAGExecutor (add its node to one, or use a callback that "
+      "does not wait)");
 }
 
 std::shared_ptr<ExecutorContext> Callback::leave() {

@@ -52,6 +52,9 @@ class Callback : public TimerQueue::Timer,
   void let_wait() const;
   /// See ExecutorContext.
   [[nodiscard]] redag::runtime::DeviceHandle device(const std::string &name) const;
+  /// The callback of this entity if it is in the same mutually exclusive group as this one; otherwise null. Throws
+  /// redag::WaitCancelled once detached.
+  [[nodiscard]] std::shared_ptr<Callback> in_own_group(const void *entity) const;
   /// Called at the end of a job's coroutine, in the job.
   void coroutine_ended();
   /// True if the middleware takes messages back when the callback returns.
@@ -121,5 +124,8 @@ class Callback : public TimerQueue::Timer,
   redag::Histogram response_;
   redag::Histogram execution_;
 };
+
+/// The callback whose job the calling thread runs. Throws std::logic_error if there is none that may wait.
+[[nodiscard]] Callback &this_callback();
 
 }  // namespace redag_rclcpp

@@ -489,6 +489,7 @@ void ReDAGExecutor::Core::begin_learning() {
 void ReDAGExecutor::Core::stop_learning() {
   learning_ = false;
   RCLCPP_INFO(logger(), "learned the rates of %zu callbacks; they no longer change", registry_.adopt_rates());
+  learned_ = true;
 }
 
 // ---- queries ----

@@ -69,7 +69,7 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
   [[nodiscard]] const TaskTable &tasks() const { return tasks_; }
   [[nodiscard]] std::vector<std::string> warnings() const;
   [[nodiscard]] std::vector<Deadlock> deadlocks() const { return notes_.deadlocks(); }
-  [[nodiscard]] bool learning_done() const { return !learning_; }
+  [[nodiscard]] bool learning_done() const { return options_.learn.count() <= 0 || learned_; }
   void set_live_bounds(std::map<std::string, redag::Duration> bounds) { notes_.set_live_bounds(std::move(bounds)); }
   [[nodiscard]] redag::trace::RunInfo run_info(std::vector<std::uint32_t> &positions) const;
 
@@ -85,6 +85,9 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
   void entities_changed() override;
   [[nodiscard]] bool learning() const override { return learning_; }
   void let_wait() override;
+  [[nodiscard]] std::shared_ptr<Callback> find_in_group(redag::TaskId member, const void *entity) const override {
+    return tasks_.find_in_group(member, entity);
+  }
   [[nodiscard]] redag::runtime::DeviceHandle device(const std::string &name) const override;
 
  private:
@@ -123,6 +126,7 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
 
   std::atomic<bool> direct_{false};
   std::atomic<bool> learning_{false};
+  std::atomic<bool> learned_{false};  // the window is over, and callbacks have their rates
   redag::Time learn_until_ = redag::kNever;
   redag::Time report_unmatched_at_ = redag::kNever;
   redag::Time look_at_middleware_at_ = redag::kNever;

@@ -20,6 +20,7 @@ namespace {
 
 constexpr std::chrono::milliseconds kAskAgain(10);  // between looks for the service
 constexpr std::chrono::seconds kPatience(1);        // until the warning that it is not available
+constexpr std::chrono::milliseconds kMayStep(100);  // between looks at a clock that the system may set
 
 void warn(const rclcpp::ClientBase &client, bool is_attached) {
   const rclcpp::Logger logger = rclcpp::get_logger("redag_rclcpp");
@@ -40,15 +41,6 @@ std::shared_ptr<rclcpp::ClientBase> existing(const std::weak_ptr<rclcpp::ClientB
   return client;
 }
 
-Callback &this_callback() {
-  const redag::runtime::RunningJob *const running = redag::runtime::RunningJob::current();
-  auto *const callback = running == nullptr ? nullptr : dynamic_cast<Callback *>(running->owner);
-  if (callback != nullptr) return *callback;
-  throw std::logic_error(
-      "redag_rclcpp::coroutine(): the callback runs in no ReDAGExecutor (add its node to one, or use a callback that "
-      "does not wait)");
-}
-
 }  // namespace
 
 CallbackJob::CallbackJob() : callback_(this_callback().shared_from_this()) { callback_->let_wait(); }
@@ -63,7 +55,7 @@ void CallbackJob::run(redag::Coroutine coroutine) {
 void CallbackJob::end() const { callback_->coroutine_ended(); }
 
 // The client is held only while this runs. Where it is gone, so is what the caller would do with the response.
-redag::Coroutine CallBase::exchange() {
+redag::Coroutine CallBase::run() {
   const std::shared_ptr<AwaitedCalls> calls = AwaitedCalls::of(existing(client_));
   const steady_clock::time_point warn_at = steady_clock::now() + kPatience;
   for (bool warned = false;;) {
@@ -85,10 +77,50 @@ redag::Coroutine CallBase::exchange() {
   }
 }
 
+ClockSleep::ClockSleep(std::shared_ptr<rclcpp::Clock> clock, const rclcpp::Time &until)
+    : clock_(std::move(clock)), until_(until) {
+  if (until_.get_clock_type() == clock_->get_clock_type()) return;
+  throw std::invalid_argument(
+      "redag_rclcpp::sleep_until(): the time is of another clock type than the clock (take it from clock->now())");
+}
+
+redag::Coroutine ClockSleep::run() {
+  redag::AsyncEvent changed;
+  // Called with the clock's lock held, at each message on /clock, and when use_sim_time changes.
+  rcl_jump_threshold_t any{};
+  any.on_clock_change = true;
+  any.min_forward.nanoseconds = 1;
+  any.min_backward.nanoseconds = -1;
+  rclcpp::JumpHandler::SharedPtr handler;
+  const bool can_be_simulated = clock_->get_clock_type() == RCL_ROS_TIME;
+  if (can_be_simulated) {
+    handler = clock_->create_jump_callback(
+        nullptr, [&changed](const rcl_time_jump_t &) { changed.set(); }, any);
+  }
+  const bool is_steady = clock_->get_clock_type() == RCL_STEADY_TIME;
+  for (rclcpp::Time now = clock_->now(); now < until_; now = clock_->now()) {
+    if (can_be_simulated && clock_->ros_time_is_active()) {
+      co_await changed;
+      continue;
+    }
+    const std::chrono::nanoseconds rest((until_ - now).nanoseconds());
+    const std::chrono::nanoseconds longest = is_steady ? rest : std::min<std::chrono::nanoseconds>(rest, kMayStep);
+    co_await changed.wait_until(steady_clock::now() + longest);
+  }
+}
+
 }  // namespace redag_rclcpp::detail
 
 namespace redag_rclcpp {
 
-redag::runtime::DeviceHandle device(const std::string &name) { return detail::this_callback().device(name); }
+detail::ClockSleep sleep_until(const std::shared_ptr<rclcpp::Clock> &clock, const rclcpp::Time &time) {
+  return {clock, time};
+}
+
+detail::ClockSleep sleep_for(const std::shared_ptr<rclcpp::Clock> &clock, const rclcpp::Duration &duration) {
+  return {clock, clock->now() + duration};
+}
+
+redag::runtime::DeviceHandle device(const std::string &name) { return this_callback().device(name); }
 
 }  // namespace redag_rclcpp

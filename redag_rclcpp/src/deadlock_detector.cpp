@@ -130,9 +130,11 @@ class DeadlockDetector::Picture {
     }
     block.kind = Block::Kind::Dag;
     if (place.max_active > 0 && active >= place.max_active) return block;
-    block.kind = Block::Kind::Workers;
-    for (std::size_t i = 0; i < tops_.size(); ++i) block.tops.insert(i);
-    if (tops_.size() >= workers_) return block;
+    block = {.kind = Block::Kind::Workers};
+    for (std::size_t i = 0; i < tops_.size(); ++i) {
+      if (!tops_[i].job.lends) block.tops.insert(i);
+    }
+    if (block.tops.size() >= workers_) return block;
     return std::nullopt;
   }
 

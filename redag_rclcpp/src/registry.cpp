@@ -211,6 +211,7 @@ void Registry::add(const Entity &found) {
 
   const std::shared_ptr<Callback> callback = found.make(executor_.lock(), entry.id);
   entry.callback = callback;
+  entry.entity = found.key;
   callback->set_deadline(entry.task.deadline);
 
   const redag::TaskId task = parts_.engine.add_task(

@@ -2,33 +2,18 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Waitables as callbacks: action servers and clients, QoS events, and what users derive from rclcpp::Waitable.
-#include <cxxabi.h>
-
-#include <cstdlib>
+#include <atomic>
 #include <memory>
-#include <string>
-#include <typeinfo>
 #include <utility>
 
+#include "action_type.hpp"
 #include "arrival_callback.hpp"
 #include "compat.hpp"
 #include "entities.hpp"
+#include "stand_in.hpp"
 
 namespace redag_rclcpp {
 namespace {
-
-/// The argument of the waitable's class template: "test_msgs::action::Fibonacci" for rclcpp_action::Client of it.
-/// rclcpp does not tell the names of actions.
-std::string action_type_of(const rclcpp::Waitable &waitable) {
-  const char *const mangled = typeid(waitable).name();
-  int status = 0;
-  const std::unique_ptr<char, void (*)(void *)> name(abi::__cxa_demangle(mangled, nullptr, nullptr, &status),
-                                                     std::free);
-  const std::string type = status == 0 ? name.get() : mangled;
-  const std::size_t begin = type.find('<');
-  const std::size_t end = type.rfind('>');
-  return begin < end && end != std::string::npos ? type.substr(begin + 1, end - begin - 1) : type;
-}
 
 Exchange exchange_of(const rclcpp::Waitable &waitable) {
   Exchange exchange;
@@ -39,7 +24,7 @@ Exchange exchange_of(const rclcpp::Waitable &waitable) {
   return exchange;
 }
 
-class WaitableCallback final : public ArrivalCallback {
+class WaitableCallback final : public ArrivalCallback, public ActionClientCallback {
  public:
   WaitableCallback(std::shared_ptr<ExecutorContext> context, redag::CallbackId id,
                    const rclcpp::Waitable::SharedPtr &waitable)
@@ -51,6 +36,32 @@ class WaitableCallback final : public ArrivalCallback {
 
   [[nodiscard]] bool alive() const override { return !waitable_.expired(); }
   [[nodiscard]] Exchange exchange() const override { return exchange_; }
+
+  // Functions of ActionClientCallback.
+  void begin_stand_in(redag::AsyncEvent &event) override {
+    {
+      const redag::LockGuard guard(lock_);
+      stand_in_.store(&event, std::memory_order_release);
+    }
+    hold_releases();
+  }
+  [[nodiscard]] bool stand_in() override { return handle_next(); }
+  void end_stand_in() override {
+    {
+      const redag::LockGuard guard(lock_);
+      stand_in_.store(nullptr, std::memory_order_release);
+    }
+    resume_releases();
+  }
+
+  void seen_by_wait_set() override {
+    ArrivalCallback::seen_by_wait_set();
+    wake_stand_in();
+  }
+  void take_leftovers(const Held &held, rcl_wait_set_t &set, bool any) override {
+    ArrivalCallback::take_leftovers(held, set, any);
+    wake_stand_in();
+  }
 
   // The on-ready hook also reports what was ready before.
   [[nodiscard]] Held hooked() const override { return {}; }
@@ -72,6 +83,7 @@ class WaitableCallback final : public ArrivalCallback {
     waitable->set_on_ready_callback(
         [self = std::static_pointer_cast<WaitableCallback>(shared_from_this())](std::size_t count, int part) {
           self->arrived(count, Source::Middleware, part);
+          self->wake_stand_in();
         });
   }
   void unhook() override {
@@ -83,6 +95,13 @@ class WaitableCallback final : public ArrivalCallback {
     } catch (const std::exception &) {
       // Setting this hook had failed as well.
     }
+  }
+
+  // The event is set under the lock: the job calls end_stand_in() before it destroys it.
+  void wake_stand_in() {
+    if (stand_in_.load(std::memory_order_acquire) == nullptr) return;
+    const redag::LockGuard guard(lock_);
+    if (redag::AsyncEvent *const event = stand_in_.load(std::memory_order_relaxed)) event->set();
   }
 
   [[nodiscard]] bool is_hooked_by_user() const override {
@@ -103,7 +122,8 @@ class WaitableCallback final : public ArrivalCallback {
 
   const std::weak_ptr<rclcpp::Waitable> waitable_;
   const Exchange exchange_;
-  bool hooked_ = false;  // hook() was called, even if it failed
+  bool hooked_ = false;                                 // hook() was called, even if it failed
+  std::atomic<redag::AsyncEvent *> stand_in_{nullptr};  // of the job that stands in; written under lock_
 };
 
 }  // namespace

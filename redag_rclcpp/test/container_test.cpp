@@ -100,7 +100,7 @@ class ContainerTest : public ::testing::Test {
     const std::filesystem::path index = folder_ / "share/ament_index/resource_index";
     std::filesystem::create_directories(index / "rclcpp_components");
     std::ofstream components(index / "rclcpp_components" / "examples");
-    for (const char *name : {"Sensor", "Filter", "Control"}) {
+    for (const char *name : {"Sensor", "Filter", "Control", "Map", "Planner"}) {
       components << "redag_rclcpp::examples::" << name << ";" << COMPONENTS << "\n";
     }
     const char *prefixes = std::getenv("AMENT_PREFIX_PATH");
@@ -204,6 +204,18 @@ TEST_F(ContainerTest, ArgumentsOfRclcppsContainerAreAccepted) {
   EXPECT_EQ(workers_with({"--executor-type", "multi-threaded", "--ros-args", "-p", "thread_num:=1"}), 1);
   EXPECT_EQ(workers_with({"--executor-type", "events-cbg", "--ros-args", "-p", "workers:=3"}), 3);
   EXPECT_THAT(text(), Not(HasSubstr("not known")));
+}
+
+TEST_F(ContainerTest, ACallbackWaitsForItsOwnGroupsClientsWithOneWorker) {
+  Process container = start({"--ros-args", "-p", "workers:=1"});
+  for (const char *plugin : {"Map", "Planner"}) {
+    const auto loaded = load(plugin, {});
+    ASSERT_NE(loaded, nullptr);
+    ASSERT_TRUE(loaded->success) << loaded->error_message;
+  }
+  EXPECT_TRUE(eventually([&] { return text().find("plans with the map, cells of 0.05 m") != std::string::npos; }));
+  container.interrupt();
+  EXPECT_EQ(container.wait(), 0);
 }
 
 TEST_F(ContainerTest, ComponentsRunAndResultsAreWrittenAtTheEnd) {

@@ -237,6 +237,27 @@ TEST(DeadlockDetector, AClientThatCannotAnswerEitherIsNoAlternative) {
   EXPECT_THAT(robot.pass(kSecond), SizeIs(1));
 }
 
+// ---- workers that are lent ----
+
+TEST(DeadlockDetector, NamesAJobThatHasLentItsWorkerAndHoldsTheGroup) {
+  Robot robot(1);
+  wait_in_own_group(robot);
+  robot.jobs.back().lends = true;
+  const std::vector<Deadlock> found = robot.pass(kSecond);
+  ASSERT_THAT(found, SizeIs(1));
+  EXPECT_TRUE(found[0].certain);
+  EXPECT_EQ(found[0].resource, "group g0");
+}
+
+TEST(DeadlockDetector, AWorkerThatIsLentCanTakeTheResponse) {
+  Robot robot(1);
+  Endpoint &client = robot.client("/n", "/map", "g1");
+  robot.start("/n", "timer", "g0");
+  robot.jobs.back().lends = true;
+  robot.arrives(client);
+  EXPECT_THAT(robot.pass(30 * kSecond), IsEmpty());
+}
+
 // ---- no worker ----
 
 TEST(DeadlockDetector, NamesACallbackThatHasTheOnlyWorker) {

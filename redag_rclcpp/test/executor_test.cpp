@@ -486,23 +486,28 @@ TEST_P(ExecutorTest, LearnsARateOnceWhereOthersSubscribeToo) {
   auto recorder = std::make_shared<rclcpp::Node>("recorder");
   auto recorded = recorder->create_subscription<Empty>("/image", rclcpp::QoS(10), [](Empty::ConstSharedPtr) {});
   executor.add_node(node);
+  ASSERT_TRUE(eventually([&] { return out->get_subscription_count() == 2; })) << "the window begins with spin()";
   const Spinner spinner(executor);
-  ASSERT_TRUE(eventually([&] { return out->get_subscription_count() == 2; }));
-  constexpr int kSent = 20;
-  for (int sent = 0; sent < kSent; ++sent) {
-    out->publish(Empty());
-    std::this_thread::sleep_for(20ms);
-  }
+  // Publishes for as long as it learns, however slow the machine is.
+  int sent = 0;
+  ASSERT_TRUE(eventually([&] { return executor.learning_done(); },
+                         [&] {
+                           out->publish(Empty());
+                           ++sent;
+                           std::this_thread::sleep_for(20ms);
+                           EXPECT_TRUE(eventually([&] { return called == sent; }));
+                         }));
   CallbackStats image;
   const auto is_learned = [&] {
     for (const CallbackStats &stats : executor.stats()) {
       if (stats.id.name == "/image") image = stats;
     }
-    return image.jobs.finished == kSent && image.period != options.default_period.count();
+    return image.jobs.finished == static_cast<std::uint64_t>(sent) && image.period != options.default_period.count();
   };
-  EXPECT_TRUE(eventually(is_learned)) << "finished " << image.jobs.finished;
-  EXPECT_EQ(called, kSent);
-  EXPECT_GE(image.period, 19'000'000) << "no two messages are closer than 20 ms";
+  EXPECT_TRUE(eventually(is_learned)) << "finished " << image.jobs.finished << " of " << sent;
+  EXPECT_EQ(called, sent);
+  // No two messages are closer than 20 ms. The last copies may not have been taken when learning ends.
+  EXPECT_GE(image.period, 15'000'000);
 }
 
 TEST_P(ExecutorTest, ItsTraceHoldsToTheModel) {

@@ -22,6 +22,7 @@
 #include <utility>
 
 #include "rclcpp/client.hpp"
+#include "rclcpp/clock.hpp"
 #include "rclcpp/function_traits.hpp"
 #include "rclcpp/service.hpp"
 #include "redag/runtime/async_event.hpp"
@@ -91,50 +92,82 @@ std::function<void(Arguments...)> make_callback(std::shared_ptr<Function> functi
   };
 }
 
-/// One call of a service, for co_await. The library's part, which knows no types.
+/// For co_await: runs the coroutine that Derived::run() returns, and returns Derived::result().
+template <class Derived>
+class Awaitable {
+ public:
+  [[nodiscard]] bool await_ready() const noexcept { return false; }
+  [[nodiscard]] std::coroutine_handle<> await_suspend(std::coroutine_handle<> caller) {
+    part_ = derived().run();
+    return redag::Coroutine::Part{part_.handle()}.await_suspend(caller);
+  }
+  [[nodiscard]] auto await_resume() {
+    redag::Coroutine::Part{part_.handle()}.await_resume();
+    return derived().result();
+  }
+  /// By value: GCC 12 copies an awaiter that it is given by reference.
+  [[nodiscard]] Derived in_coroutine() && { return std::move(derived()); }
+
+ private:
+  friend Derived;
+  Awaitable() = default;
+  [[nodiscard]] Derived &derived() { return static_cast<Derived &>(*this); }
+
+  redag::Coroutine part_;
+};
+
+/// One call of a service. The library's part, which knows no types.
 class CallBase {
  public:
   CallBase(const std::shared_ptr<rclcpp::ClientBase> &client, std::shared_ptr<void> request,
            std::chrono::steady_clock::time_point until)
       : client_(client), request_(std::move(request)), until_(until) {}
-  CallBase(CallBase &&) = default;
-  CallBase &operator=(CallBase &&) = delete;
 
-  [[nodiscard]] bool await_ready() const noexcept { return false; }
-  [[nodiscard]] std::coroutine_handle<> await_suspend(std::coroutine_handle<> caller) {
-    exchange_ = exchange();
-    return redag::Coroutine::Part{exchange_.handle()}.await_suspend(caller);
-  }
+  /// Waits for the response.
+  [[nodiscard]] redag::Coroutine run();
 
  protected:
+  CallBase(CallBase &&) = default;
+  CallBase &operator=(CallBase &&) = delete;
   ~CallBase() = default;
   /// The response; null: it did not come in time.
-  [[nodiscard]] std::shared_ptr<void> take_response() {
-    redag::Coroutine::Part{exchange_.handle()}.await_resume();
-    return std::move(response_);
-  }
+  [[nodiscard]] std::shared_ptr<void> take_response() { return std::move(response_); }
 
  private:
-  [[nodiscard]] redag::Coroutine exchange();
-
   const std::weak_ptr<rclcpp::ClientBase> client_;  // the coroutine keeps no entity of its node
   std::shared_ptr<void> request_;
   const std::chrono::steady_clock::time_point until_;
   std::shared_ptr<void> response_;
-  redag::Coroutine exchange_;
 };
 
 template <class Service>
-class Call : public CallBase {
+class Call : public CallBase, public Awaitable<Call<Service>> {
  public:
   using CallBase::CallBase;
 
-  /// For co_await. By value: GCC 12 copies an awaiter that it is given by reference.
-  [[nodiscard]] Call in_coroutine() && { return std::move(*this); }
-  [[nodiscard]] std::shared_ptr<typename Service::Response> await_resume() {
+  [[nodiscard]] std::shared_ptr<typename Service::Response> result() {
     return std::static_pointer_cast<typename Service::Response>(take_response());
   }
 };
+
+/// For co_await: see sleep_until().
+class ClockSleep : public Awaitable<ClockSleep> {
+ public:
+  ClockSleep(std::shared_ptr<rclcpp::Clock> clock, const rclcpp::Time &until);
+
+  [[nodiscard]] redag::Coroutine run();
+  void result() const {}
+
+ private:
+  std::shared_ptr<rclcpp::Clock> clock_;
+  rclcpp::Time until_;
+};
+
+/// When a wait with this limit ends.
+template <class Rep, class Period>
+[[nodiscard]] std::chrono::steady_clock::time_point from_now(std::chrono::duration<Rep, Period> timeout) {
+  return std::chrono::steady_clock::now() + std::chrono::duration_cast<std::chrono::nanoseconds>(timeout);
+}
 
 }  // namespace detail
 
@@ -175,6 +208,15 @@ template <class Service, class Function>
 /// outside callbacks.
 [[nodiscard]] redag::runtime::DeviceHandle device(const std::string &name);
 
+/// co_await sleep_until(clock, time): goes on once the clock shows `time`, for instance that of a node, get_clock().
+/// With use_sim_time this is at the first message on /clock that says so. A clock that goes back makes the wait longer,
+/// and one that jumps ahead ends it. If the system's clock is set, this is seen within 100 ms. Throws
+/// std::invalid_argument if the time is of another clock type.
+[[nodiscard]] detail::ClockSleep sleep_until(const std::shared_ptr<rclcpp::Clock> &clock, const rclcpp::Time &time);
+/// co_await sleep_for(clock, duration): as sleep_until(), `duration` after what the clock shows now.
+[[nodiscard]] detail::ClockSleep sleep_for(const std::shared_ptr<rclcpp::Clock> &clock,
+                                           const rclcpp::Duration &duration);
+
 /// co_await call(client, request): sends the request and returns the response. Waits for the service to be available
 /// first, and logs a warning if that takes longer than a second. The client's node must be in a ReDAGExecutor, which
 /// may be another one. Throws std::runtime_error if the client is destroyed meanwhile.
@@ -189,8 +231,7 @@ template <class Service, class Rep, class Period>
 [[nodiscard]] detail::Call<Service> call(const std::shared_ptr<rclcpp::Client<Service>> &client,
                                          std::shared_ptr<typename Service::Request> request,
                                          std::chrono::duration<Rep, Period> timeout) {
-  return {client, std::move(request),
-          std::chrono::steady_clock::now() + std::chrono::duration_cast<std::chrono::nanoseconds>(timeout)};
+  return {client, std::move(request), detail::from_now(timeout)};
 }
 
 }  // namespace redag_rclcpp
