@@ -180,11 +180,11 @@ await test('perception: devices have rows, and the parts of a response sum to it
   await page.getByRole('button', {name: 'workers and devices', exact: true}).click();
   assert.notEqual((await figure.boundingBox()).height, height);
   await figureShot(page, 'schedule', 'devices-workers');
-  // Somewhere in the row of the device, the last one, a job is served.
+  // Somewhere in the row of the device, the last one above the axis, a job is served.
   const {width, height: rows} = await figure.boundingBox();
   let seen = '';
   for (let x = 0.1; x < 0.95 && !/gpu: /.test(seen); x += 0.01) {
-    await figure.hover({position: {x: width * x, y: rows - 52 - 15}});
+    await figure.hover({position: {x: width * x, y: rows - 82}});
     await page.waitForTimeout(10);
     seen = (await page.locator('.tip:visible').allInnerTexts()).join(' ');
   }
