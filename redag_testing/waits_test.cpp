@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Random workloads whose jobs wait for devices, simulated: PriorityScheduler gives the jobs of ReferenceScheduler, and
-// the trace keeps every rule. What the scheduler does when a driver reports waits in any order is in
-// differential_test.cpp.
+// the trace keeps every rule. The parts of each response sum to it. What the scheduler does when a driver reports waits
+// in any order is in differential_test.cpp.
 #include <cstdint>
 #include <string>
 #include <tuple>
@@ -76,6 +76,12 @@ TEST_P(SimulatedWaits, FollowTheModel) {
     ASSERT_TRUE(report.ok()) << report.to_string() << replay;
     ReferenceScheduler expected(info.workload, info.config);
     ASSERT_EQ(jobs_of(trace), jobs_of(simulated(info, expected))) << replay;
+    for (const metrics::JobRecord &job : jobs_of(trace)) {
+      if (job.outcome != metrics::JobOutcome::Finished) continue;
+      ASSERT_EQ(job.split.sum(), job.response()) << replay;
+      ASSERT_EQ(job.split[metrics::Stay::OnWorker], job.on_worker) << replay;
+      for (const Duration length : job.split.length) ASSERT_GE(length, 0) << replay;
+    }
     for (const JobEvent &event : trace.events) waits += event.kind == JobEventKind::Served ? 1U : 0U;
   }
   EXPECT_GT(waits, count) << "devices hardly served anything";

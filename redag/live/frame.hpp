@@ -43,6 +43,18 @@ struct ThreadFrame {
   std::optional<std::uint32_t> task = {};  // index of the task whose job it runs
 };
 
+struct DeviceFrame {
+  std::string name;
+  std::uint32_t slots = 1;
+  std::uint32_t used = 0;    // slots
+  std::uint32_t queued = 0;  // jobs that asked it and are not served yet
+  std::uint64_t served = 0;  // services that have ended
+  std::uint64_t recent_served = 0;
+  Duration busy = 0;  // time of its services, of all slots together
+  Duration recent_busy = 0;
+  std::vector<std::uint32_t> tasks = {};  // indices of the tasks whose jobs it serves, as far as the page has room
+};
+
 struct Frame {
   std::string name;
   std::string program;
@@ -62,6 +74,8 @@ struct Frame {
   std::vector<TaskFrame> tasks;      // ordered by DAG
   std::vector<ThreadFrame> threads;  // by index; the busiest ones if there are too many
   std::uint32_t threads_in_all = 0;
+  std::vector<DeviceFrame> devices;  // in the executor's order; the busiest ones if there are too many
+  std::uint32_t devices_in_all = 0;
 };
 
 }  // namespace redag::live

@@ -4,6 +4,7 @@
 #include "redag/live/frame_builder.hpp"
 
 #include <algorithm>
+#include <numeric>
 #include <utility>
 
 #include "redag/base/check.hpp"
@@ -36,6 +37,7 @@ void add(page::Figures &sum, const page::Figures &task) {
   sum.active += task.active;
   sum.ready += task.ready;
   sum.waiting += task.waiting;
+  sum.away += task.away;
 }
 
 void set_counts(std::uint32_t (&counts)[page::kClasses], const HistogramCounts &histogram) {
@@ -90,6 +92,7 @@ void FrameBuilder::build(const Sample &sample, Time now, Frame &frame) {
   }
   build_tasks(sample, turns, frame);
   build_threads(sample, turns, frame);
+  build_devices(sample, turns, frame);
   if (turns) {
     base_at_ = next_at_;
     next_at_ = now;
@@ -150,11 +153,10 @@ void FrameBuilder::build_threads(const Sample &sample, bool turns, Frame &frame)
   for (std::size_t i = 0; i < sample.threads.size(); ++i) {
     const ThreadSample &thread = sample.threads[i];
     ThreadHistory &history = threads_[i];
-    const auto row = thread.task ? row_of_.find(*thread.task) : row_of_.end();
     frame.threads.push_back({.index = static_cast<std::uint32_t>(i),
                              .used = thread.used,
                              .recent_used = thread.used - history.base,
-                             .task = row == row_of_.end() ? std::nullopt : std::optional(row->second)});
+                             .task = thread.task ? row_of(*thread.task) : std::nullopt});
     if (turns) history = {history.next, thread.used};
   }
   if (frame.threads.size() <= page::kThreads) return;
@@ -163,6 +165,47 @@ void FrameBuilder::build_threads(const Sample &sample, bool turns, Frame &frame)
   frame.threads.resize(page::kThreads);
   std::sort(frame.threads.begin(), frame.threads.end(),
             [](const ThreadFrame &a, const ThreadFrame &b) { return a.index < b.index; });
+}
+
+void FrameBuilder::build_devices(const Sample &sample, bool turns, Frame &frame) {
+  frame.devices.clear();
+  frame.devices_in_all = static_cast<std::uint32_t>(sample.devices.size());
+  devices_.resize(sample.devices.size());
+  for (std::size_t d = 0; d < sample.devices.size(); ++d) {
+    const DeviceSample &device = sample.devices[d];
+    DeviceHistory &history = devices_[d];
+    // A service that ends while the sample is taken may have been counted a little longer before.
+    const DeviceMark now{std::max(device.busy, history.next.busy), device.served};
+    DeviceFrame &row = frame.devices.emplace_back();
+    row.name = device.name;
+    row.slots = device.slots;
+    row.used = static_cast<std::uint32_t>(device.serves.size());
+    row.queued = device.queued;
+    row.served = now.served;
+    row.recent_served = now.served - history.base.served;
+    row.busy = now.busy;
+    row.recent_busy = now.busy - history.base.busy;
+    for (const std::uint64_t key : device.serves) {
+      const auto task = row_of(key);
+      if (task && row.tasks.size() < page::kServices) row.tasks.push_back(*task);
+    }
+    if (turns) history = {history.next, now};
+  }
+  if (frame.devices.size() <= page::kDevices) return;
+  std::vector<std::size_t> kept(frame.devices.size());
+  std::iota(kept.begin(), kept.end(), std::size_t{0});
+  std::stable_sort(kept.begin(), kept.end(), [&](std::size_t a, std::size_t b) {
+    return frame.devices[a].recent_busy > frame.devices[b].recent_busy;
+  });
+  kept.resize(page::kDevices);
+  std::sort(kept.begin(), kept.end());
+  for (std::size_t i = 0; i < kept.size(); ++i) frame.devices[i] = frame.devices[kept[i]];
+  frame.devices.resize(kept.size());
+}
+
+std::optional<std::uint32_t> FrameBuilder::row_of(std::uint64_t key) const {
+  const auto row = row_of_.find(key);
+  return row == row_of_.end() ? std::nullopt : std::optional(row->second);
 }
 
 page::Figures FrameBuilder::figures_of(const TaskSample &task, const Mark &now, const HistogramCounts &recent,
@@ -183,6 +226,7 @@ page::Figures FrameBuilder::figures_of(const TaskSample &task, const Mark &now, 
   figures.active = task.active;
   figures.ready = task.ready;
   figures.waiting = task.waiting;
+  figures.away = task.away;
   set_response(figures, now.response, recent);
   return figures;
 }

@@ -41,6 +41,7 @@ struct TaskSample {
   std::uint64_t preemptions = 0;
   Duration cpu = 0;
   std::uint32_t active = 0;
+  std::uint32_t away = 0;
   std::uint32_t ready = 0;
   std::uint32_t waiting = 0;
   std::shared_ptr<const Histogram> response;  // null: not measured
@@ -55,10 +56,20 @@ struct ThreadSample {
   std::optional<std::uint64_t> task = {};  // key of the task whose job it runs
 };
 
+struct DeviceSample {
+  std::string name;
+  std::uint32_t slots = 1;
+  std::uint32_t queued = 0;                // jobs that asked it and are not served yet
+  std::uint64_t served = 0;                // services that have ended
+  Duration busy = 0;                       // time of all its services, in progress or ended
+  std::vector<std::uint64_t> serves = {};  // keys of the tasks of the jobs that it serves now
+};
+
 struct Sample {
   std::vector<DagSample> dags;
   std::vector<TaskSample> tasks;        // in any order; `dag` must be among the DAGs
   std::vector<ThreadSample> threads{};  // the same ones each time
+  std::vector<DeviceSample> devices{};  // the same ones each time
   std::string alert{};                  // see Frame
 };
 
@@ -90,9 +101,20 @@ class FrameBuilder {
     Duration base = 0;
     Duration next = 0;
   };
+  struct DeviceMark {
+    Duration busy = 0;
+    std::uint64_t served = 0;
+  };
+  struct DeviceHistory {
+    DeviceMark base;
+    DeviceMark next;
+  };
 
   void build_tasks(const Sample &sample, bool turns, Frame &frame);
   void build_threads(const Sample &sample, bool turns, Frame &frame);
+  void build_devices(const Sample &sample, bool turns, Frame &frame);
+  /// Returns the row of a task of this frame by its key; nothing if there is none.
+  [[nodiscard]] std::optional<std::uint32_t> row_of(std::uint64_t key) const;
 
   static page::Figures figures_of(const TaskSample &task, const Mark &now, const HistogramCounts &recent,
                                   const Mark &base);
@@ -105,6 +127,7 @@ class FrameBuilder {
   std::map<std::uint64_t, History> histories_;     // by TaskSample::key
   std::map<std::uint64_t, std::uint32_t> row_of_;  // of the tasks of this frame, by key
   std::vector<ThreadHistory> threads_;             // as Sample::threads
+  std::vector<DeviceHistory> devices_;             // as Sample::devices
 };
 
 }  // namespace redag::live

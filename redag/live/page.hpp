@@ -64,7 +64,7 @@ struct Figures {
   std::uint32_t active;   // jobs that have started and not ended
   std::uint32_t ready;    // jobs that could start
   std::uint32_t waiting;  // released jobs whose predecessors are incomplete
-  std::uint32_t reserved;
+  std::uint32_t away;     // active jobs that wait without a worker: for a device, an event, a time, a call that blocks
 };
 
 /// How often response times occurred: counts of classes of time. There are two classes an octave (see least_in()). The
@@ -115,6 +115,22 @@ struct ThreadRow {
 inline constexpr std::size_t kThreads = 64;
 inline constexpr std::uint32_t kNoTask = 0xffffffff;
 
+inline constexpr std::size_t kServices = 4;
+/// A device. Those with the most recent work, in their order, if there are more than kDevices.
+struct DeviceRow {
+  char name[kNameSize];
+  std::int64_t busy;  // time of its services, of all slots together
+  std::int64_t recent_busy;
+  std::uint64_t served;  // services that have ended
+  std::uint64_t recent_served;
+  std::uint32_t slots;
+  std::uint32_t used;             // slots
+  std::uint32_t queued;           // jobs that asked it and are not served yet
+  std::uint32_t task[kServices];  // indices of the task rows of jobs that it serves; kNoTask: no more, or not known
+  std::uint32_t reserved;
+};
+inline constexpr std::size_t kDevices = 12;
+
 /// At the start of a slot. `dags` rows of DAGs follow, then `tasks` rows of tasks.
 struct FrameHeader {
   std::uint64_t checksum;  // of all later bytes in the frame
@@ -139,6 +155,9 @@ struct FrameHeader {
   std::uint32_t threads;         // rows below that are used
   std::uint32_t threads_in_all;  // of the executor
   ThreadRow thread[kThreads];
+  std::uint32_t devices;         // rows below that are used
+  std::uint32_t devices_in_all;  // of the executor
+  DeviceRow device[kDevices];
 };
 
 /// Sizes without the fields that were appended to version 1. A reader takes those as zero where a page lacks them.
@@ -150,17 +169,18 @@ template <class Row>
 inline constexpr bool kIsPlain = std::is_trivially_copyable_v<Row>&& std::is_standard_layout_v<Row> &&
                                  sizeof(Row) % 8 == 0;
 static_assert(kIsPlain<Header> && kIsPlain<Figures> && kIsPlain<DagRow> && kIsPlain<TaskRow> && kIsPlain<FrameHeader>);
-static_assert(kIsPlain<Spread> && kIsPlain<ThreadRow>);
+static_assert(kIsPlain<Spread> && kIsPlain<ThreadRow> && kIsPlain<DeviceRow>);
 
 // Sizes and offsets as in docs/live_page.md.
 static_assert(sizeof(Header) == 88 && offsetof(Header, page_size) == 32 && offsetof(Header, pid) == 56);
 static_assert(offsetof(Header, sequence) == 80);
 static_assert(sizeof(Figures) == 160 && offsetof(Figures, response_p50) == 64 && offsetof(Figures, active) == 144);
-static_assert(sizeof(Spread) == 384 && sizeof(ThreadRow) == 24);
+static_assert(sizeof(Spread) == 384 && sizeof(ThreadRow) == 24 && sizeof(DeviceRow) == 160);
 static_assert(sizeof(DagRow) == 672 && offsetof(DagRow, figures) == 104 && offsetof(DagRow, deadline) == kLeastDagRow);
 static_assert(sizeof(TaskRow) == 680 && offsetof(TaskRow, period) == 104 && offsetof(TaskRow, figures) == 128);
 static_assert(offsetof(TaskRow, spread) == kLeastTaskRow && offsetof(TaskRow, priority) == 672);
-static_assert(sizeof(FrameHeader) == 2072 && offsetof(FrameHeader, name) == 80);
+static_assert(sizeof(FrameHeader) == 4000 && offsetof(FrameHeader, name) == 80);
+static_assert(offsetof(FrameHeader, devices) == 2072 && offsetof(DeviceRow, slots) == 128);
 static_assert(offsetof(FrameHeader, alert) == kLeastFrameHeader && offsetof(FrameHeader, thread) == 536);
 
 /// FNV-1a over the 8-byte words of `bytes`, whose size is a multiple of 8.

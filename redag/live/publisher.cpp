@@ -72,6 +72,7 @@ void Publisher::publish(Time now) {
   sample_.dags.clear();
   sample_.tasks.clear();
   sample_.threads.clear();
+  sample_.devices.clear();
   sampler_(sample_);
   builder_.build(sample_, now, frame_);
   frame_.publisher_cpu = read_clock(CLOCK_THREAD_CPUTIME_ID);

@@ -16,6 +16,8 @@
 namespace redag::live {
 namespace {
 
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
 TaskSample task_of(std::uint64_t key, std::uint32_t dag, std::uint64_t finished,
@@ -71,6 +73,8 @@ TEST(FrameBuilder, ADagIsTheSumOfItsTasks) {
   sample.tasks[2].active = 2;
   sample.tasks[2].ready = 3;
   sample.tasks[2].waiting = 4;
+  sample.tasks[0].away = 1;
+  sample.tasks[2].away = 2;
   Frame frame;
   builder.build(sample, kSecond / 2, frame);
   ASSERT_THAT(frame.dags, SizeIs(2));
@@ -81,6 +85,7 @@ TEST(FrameBuilder, ADagIsTheSumOfItsTasks) {
   EXPECT_EQ(frame.dags[1].figures.active, 3U);
   EXPECT_EQ(frame.dags[1].figures.ready, 3U);
   EXPECT_EQ(frame.dags[1].figures.waiting, 4U);
+  EXPECT_EQ(frame.dags[1].figures.away, 3U);
   EXPECT_EQ(frame.dags[1].figures.response_p50, 0) << "of jobs of two tasks there is none";
   EXPECT_EQ(frame.dags[1].figures.response_max, 0);
   EXPECT_EQ(frame.dags[1].figures.recent_p99, 0);
@@ -177,6 +182,56 @@ TEST(FrameBuilder, ThreadsNameTheTaskThatTheyRun) {
   EXPECT_EQ(frame.threads.back().index, 99U);
 }
 
+TEST(FrameBuilder, DevicesNameTheTasksThatTheyServe) {
+  FrameBuilder builder(0, kSecond);
+  Sample sample{{{"a", 0}, {"b", 0}}, {task_of(7, 1, 0), task_of(8, 0, 0)}};
+  sample.devices = {{"gpu", 2, 3, 10, kSecond, {7, 8}}, {"dla", 1, 0, 0, 0, {99}}};
+  Frame frame;
+  builder.build(sample, kSecond, frame);
+  builder.build(sample, 2 * kSecond, frame);
+  sample.devices[0].served += 4;
+  sample.devices[0].busy += 30;
+  builder.build(sample, 3 * kSecond, frame);
+  EXPECT_EQ(frame.devices_in_all, 2U);
+  ASSERT_THAT(frame.devices, SizeIs(2));
+  const DeviceFrame &gpu = frame.devices[0];
+  EXPECT_EQ(gpu.name, "gpu");
+  EXPECT_EQ(gpu.slots, 2U);
+  EXPECT_EQ(gpu.used, 2U);
+  EXPECT_EQ(gpu.queued, 3U);
+  EXPECT_EQ(gpu.served, 14U);
+  EXPECT_EQ(gpu.recent_served, 4U);
+  EXPECT_EQ(gpu.busy, kSecond + 30);
+  EXPECT_EQ(gpu.recent_busy, 30);
+  EXPECT_THAT(gpu.tasks, ElementsAre(1U, 0U)) << "rows are ordered by DAG";
+  EXPECT_EQ(frame.devices[1].used, 1U);
+  EXPECT_THAT(frame.devices[1].tasks, IsEmpty()) << "a task that is no longer there";
+
+  // A device seems to have been busy for a little less than before: no figure is negative.
+  sample.devices[0].busy -= 20;
+  for (int second = 4; second <= 8; ++second) {
+    builder.build(sample, second * kSecond, frame);
+    EXPECT_GE(frame.devices[0].recent_busy, 0);
+  }
+
+  // Of too many devices, those that did most lately, in their order.
+  sample.devices.assign(page::kDevices + 3, {});
+  builder.build(sample, 9 * kSecond, frame);
+  for (std::size_t d = 0; d < sample.devices.size(); ++d) {
+    sample.devices[d].name = std::to_string(d);
+    sample.devices[d].busy = d < 3 ? 0 : static_cast<Duration>(d);
+    sample.devices[d].serves.assign(6, 7);
+  }
+  sample.devices[1].busy = 100;
+  builder.build(sample, 9 * kSecond + 1, frame);
+  EXPECT_EQ(frame.devices_in_all, page::kDevices + 3);
+  ASSERT_THAT(frame.devices, SizeIs(page::kDevices));
+  EXPECT_EQ(frame.devices[0].name, "1");
+  EXPECT_EQ(frame.devices[1].name, "4");
+  EXPECT_THAT(frame.devices[1].tasks, SizeIs(page::kServices));
+  EXPECT_EQ(frame.devices.back().name, "14");
+}
+
 TEST(FrameBuilder, TheResponseOfASingleTaskIsItsDags) {
   FrameBuilder builder(0, kSecond);
   const auto slow = std::make_shared<Histogram>();
@@ -233,9 +288,11 @@ TEST(Publisher, PublishesUntilItIsGone) {
   std::atomic<std::uint64_t> finished{0};
   std::atomic<int> samples{0};
   auto publisher = Publisher::start(options, [&](Sample &sample) {
-    EXPECT_TRUE(sample.dags.empty() && sample.tasks.empty());
+    EXPECT_TRUE(sample.dags.empty() && sample.tasks.empty() && sample.threads.empty() && sample.devices.empty());
     sample.dags = {{"a", 2}};
     sample.tasks = {task_of(1, 0, finished, response)};
+    sample.threads = {{}};
+    sample.devices = {{}};
     ++samples;
   });
   ASSERT_TRUE(publisher) << to_string(publisher.error());

@@ -112,6 +112,25 @@ bool is_plausible(const page::Figures &figures) {
          is_duration(figures.recent_p99) && is_duration(figures.recent_max);
 }
 
+/// Returns false if the row is not plausible. `tasks`: how many rows of tasks there are.
+bool decode(const page::DeviceRow &row, std::uint32_t tasks, DeviceFrame &device) {
+  device.name = get_name(row.name);
+  device.slots = row.slots;
+  device.used = row.used;
+  device.queued = row.queued;
+  device.served = row.served;
+  device.recent_served = row.recent_served;
+  device.busy = row.busy;
+  device.recent_busy = row.recent_busy;
+  bool plausible = row.slots > 0 && row.used <= row.slots && is_duration(row.busy) && is_duration(row.recent_busy);
+  for (const std::uint32_t task : row.task) {
+    if (task == page::kNoTask) continue;
+    plausible = plausible && task < tasks;
+    device.tasks.push_back(task);
+  }
+  return plausible;
+}
+
 std::optional<Diagnostics> problem_with(const File &file, const std::string &path, struct stat &info) {
   if (!file.is_open()) {
     const int error = errno;
@@ -196,14 +215,19 @@ Result<Frame> decode(const std::string &path, const Header &header, const FrameH
   frame.left_out = head.left_out;
   frame.alert = get_name(head.alert);
   frame.threads_in_all = head.threads_in_all;
-  bool plausible = head.threads <= page::kThreads && is_duration(head.began) && is_duration(head.published) &&
-                   is_duration(head.interval) && is_duration(head.window) && is_duration(head.publisher_cpu);
+  frame.devices_in_all = head.devices_in_all;
+  bool plausible = head.threads <= page::kThreads && head.devices <= page::kDevices && is_duration(head.began) &&
+                   is_duration(head.published) && is_duration(head.interval) && is_duration(head.window) &&
+                   is_duration(head.publisher_cpu);
   for (std::uint32_t i = 0; plausible && i < head.threads; ++i) {
     const page::ThreadRow &row = head.thread[i];
     plausible =
         is_duration(row.used) && is_duration(row.recent_used) && (row.task < head.tasks || row.task == page::kNoTask);
     const auto task = row.task == page::kNoTask ? std::nullopt : std::optional(row.task);
     frame.threads.push_back({.index = row.index, .used = row.used, .recent_used = row.recent_used, .task = task});
+  }
+  for (std::uint32_t i = 0; plausible && i < head.devices; ++i) {
+    plausible = decode(head.device[i], head.tasks, frame.devices.emplace_back());
   }
   const std::byte *at = bytes.data() + header.frame_header_size;
   for (std::uint32_t d = 0; d < head.dags; ++d, at += header.dag_row_size) {

@@ -25,6 +25,7 @@
 namespace redag::live {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
@@ -88,6 +89,17 @@ Frame make_frame(std::size_t dags = 2, std::size_t tasks_each = 3, std::uint64_t
   frame.publisher_cpu = 12'345;
   frame.threads_in_all = 5;
   frame.threads = {{.index = 1, .used = 100, .recent_used = 10, .task = 3}, {.index = 4}};
+  frame.devices_in_all = 3;
+  frame.devices = {{.name = "gpu",
+                    .slots = 2,
+                    .used = 2,
+                    .queued = 3,
+                    .served = 40,
+                    .recent_served = 4,
+                    .busy = 400,
+                    .recent_busy = 50,
+                    .tasks = {3, 5}},
+                   {.name = "dla"}};
   for (std::size_t d = 0; d < dags; ++d) {
     frame.dags.push_back(DagFrame{"dag" + std::to_string(d), static_cast<std::uint32_t>(d), {}});
     frame.dags.back().figures.released = count;
@@ -100,6 +112,7 @@ Frame make_frame(std::size_t dags = 2, std::size_t tasks_each = 3, std::uint64_t
       task.figures.released = count;
       task.figures.recent_max = static_cast<std::int64_t>(count);
       task.figures.waiting = static_cast<std::uint32_t>(t);
+      task.figures.away = static_cast<std::uint32_t>(t + 1);
       task.spread.all[0] = static_cast<std::uint32_t>(count);
       task.priority = 80 - static_cast<int>(t);
       task.spread.recent[page::kClasses - 1] = 3;
@@ -157,6 +170,20 @@ TEST_F(LivePage, IsReadAsItWasWritten) {
   EXPECT_EQ(read.threads[0].task, 3U);
   EXPECT_EQ(read.threads[1].index, 4U);
   EXPECT_EQ(read.threads[1].task, std::nullopt);
+  EXPECT_EQ(read.tasks[1].figures.away, 2U);
+  EXPECT_EQ(read.devices_in_all, 3U);
+  ASSERT_THAT(read.devices, SizeIs(2));
+  EXPECT_EQ(read.devices[0].name, "gpu");
+  EXPECT_EQ(read.devices[0].slots, 2U);
+  EXPECT_EQ(read.devices[0].used, 2U);
+  EXPECT_EQ(read.devices[0].queued, 3U);
+  EXPECT_EQ(read.devices[0].served, 40U);
+  EXPECT_EQ(read.devices[0].recent_served, 4U);
+  EXPECT_EQ(read.devices[0].busy, 400);
+  EXPECT_EQ(read.devices[0].recent_busy, 50);
+  EXPECT_THAT(read.devices[0].tasks, ElementsAre(3U, 5U));
+  EXPECT_EQ(read.devices[1].name, "dla");
+  EXPECT_THAT(read.devices[1].tasks, IsEmpty());
 }
 
 // As programs write it that know neither alerts nor spreads: their rows are shorter.
@@ -190,6 +217,7 @@ TEST_F(LivePage, RowsOfEarlierProgramsAreRead) {
   EXPECT_EQ(page->frame.tasks[5].priority, 0);
   EXPECT_EQ(page->frame.dags[1].deadline, 0);
   EXPECT_THAT(page->frame.threads, IsEmpty());
+  EXPECT_THAT(page->frame.devices, IsEmpty());
 }
 
 // As programs write it that know no alert: the rows follow earlier. Here there are none.
@@ -237,16 +265,19 @@ TEST_F(LivePage, SaysWhatFoundNoRoom) {
   EXPECT_EQ(page->frame.left_out + page->frame.tasks.size(), 400U);
 }
 
-TEST_F(LivePage, AThreadDoesNotNameATaskThatFoundNoRoom) {
+TEST_F(LivePage, ThreadsAndDevicesDoNotNameATaskThatFoundNoRoom) {
   const auto writer = make_writer(16384);
   Frame frame = make_frame(1, 100);
   frame.threads = {{.index = 0, .task = 0}, {.index = 1, .task = 99}};
+  frame.devices = {{.name = "gpu", .slots = 2, .used = 2, .tasks = {99, 0}}};
   writer->publish(frame);
   const Result<Page> page = read_page(writer->path());
   ASSERT_TRUE(page) << to_string(page.error());
   ASSERT_THAT(page->frame.threads, SizeIs(2));
   EXPECT_EQ(page->frame.threads[0].task, 0U);
   EXPECT_EQ(page->frame.threads[1].task, std::nullopt);
+  EXPECT_EQ(page->frame.devices[0].used, 2U);
+  EXPECT_THAT(page->frame.devices[0].tasks, ElementsAre(0U));
 }
 
 TEST_F(LivePage, LongNamesAreCutBetweenCharacters) {
@@ -409,6 +440,32 @@ TEST_F(LivePage, LiesAreFound) {
   frame.published = kNever;
   writer->publish(frame);
   EXPECT_THAT(error_of(writer->path()), HasSubstr("out of range"));
+  frame = make_frame();
+  frame.devices[0].used = 3;
+  writer->publish(frame);
+  EXPECT_THAT(error_of(writer->path()), HasSubstr("out of range"));
+  frame = make_frame();
+  frame.devices[1].recent_busy = -1;
+  writer->publish(frame);
+  EXPECT_THAT(error_of(writer->path()), HasSubstr("out of range"));
+  // These the writer does not write: as many devices as a row has no room for, and a task that is not there.
+  const auto lie = [&](std::size_t offset, std::uint32_t value) {
+    writer->publish(make_frame());
+    const std::string path = copy(*writer);
+    const Result<Page> sound = read_page(path);
+    EXPECT_TRUE(sound) << to_string(sound.error());
+    const std::size_t slot = 4096 + sound->frame.sequence % 2 * kSlotSize;
+    overwrite(path, slot + offset, value);
+    std::string bytes(sizeof(page::FrameHeader) + 2 * sizeof(page::DagRow) + 6 * sizeof(page::TaskRow), '\0');
+    std::ifstream file(path, std::ios::binary);
+    file.seekg(static_cast<std::streamoff>(slot));
+    file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    overwrite(path, slot, page::checksum(std::as_bytes(std::span(bytes)).subspan(sizeof(std::uint64_t))));
+    return error_of(path);
+  };
+  EXPECT_THAT(lie(offsetof(page::FrameHeader, devices), page::kDevices + 1), HasSubstr("out of range"));
+  EXPECT_THAT(lie(offsetof(page::FrameHeader, device) + offsetof(page::DeviceRow, task), 6), HasSubstr("out of range"));
+  EXPECT_EQ(lie(offsetof(page::FrameHeader, device) + offsetof(page::DeviceRow, task), 5), "");
 }
 
 // Random bytes, in a page whose checksum is then corrected, and pages of noise only. Reading always ends, and each
@@ -428,7 +485,7 @@ TEST_F(LivePage, NoiseDoesNotCrashTheReader) {
     const std::size_t edits = all ? bytes.size() : 1 + random() % 6;
     for (std::size_t i = 0; i < edits; ++i) {
       // Most changes hit the structure; the header decides what the rest means.
-      const std::size_t at = all ? i : random() % 3 == 0 ? random() % 88 : slot + random() % 4200;
+      const std::size_t at = all ? i : random() % 3 == 0 ? random() % 88 : slot + random() % 8200;
       bytes[at] = random() % 4 == 0 ? '\xff' : static_cast<char>(random());
     }
     if (all) std::memcpy(bytes.data(), original.data(), round % 40 == 0 ? 88 : 0);
@@ -451,6 +508,10 @@ TEST_F(LivePage, NoiseDoesNotCrashTheReader) {
       EXPECT_LT(task.dag, page->frame.dags.size());
       EXPECT_GE(task.figures.recent_p99, 0);
       for (const char c : task.name) EXPECT_GE(static_cast<unsigned char>(c), 0x20);
+    }
+    for (const DeviceFrame &device : page->frame.devices) {
+      EXPECT_LE(device.used, device.slots);
+      for (const std::uint32_t task : device.tasks) EXPECT_LT(task, page->frame.tasks.size());
     }
   }
   EXPECT_GT(read, 20);  // otherwise only the first checks were tried

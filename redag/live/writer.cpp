@@ -45,6 +45,25 @@ void put_name(char (&target)[Size], const std::string &name) {
   std::memcpy(target, name.data(), length);
 }
 
+/// `tasks`: how many rows of tasks there are.
+page::DeviceRow row_of(const DeviceFrame &device, std::size_t tasks) {
+  page::DeviceRow row{};
+  put_name(row.name, device.name);
+  row.busy = device.busy;
+  row.recent_busy = device.recent_busy;
+  row.served = device.served;
+  row.recent_served = device.recent_served;
+  row.slots = device.slots;
+  row.used = device.used;
+  row.queued = device.queued;
+  std::fill(std::begin(row.task), std::end(row.task), page::kNoTask);
+  std::size_t named = 0;
+  for (const std::uint32_t task : device.tasks) {
+    if (task < tasks && named < page::kServices) row.task[named++] = task;
+  }
+  return row;
+}
+
 tl::unexpected<Diagnostics> refused(const std::string &what) {
   return make_error(fmt::format("no live page is published: {}: {}", what, std::generic_category().message(errno)),
                     "'redag top' cannot show this executor; everything else works");
@@ -162,6 +181,9 @@ void PageWriter::publish(const Frame &frame) {
     const bool is_kept = thread.task && *thread.task < tasks;
     header.thread[i] = {thread.used, thread.recent_used, thread.index, is_kept ? *thread.task : page::kNoTask};
   }
+  header.devices = static_cast<std::uint32_t>(std::min(frame.devices.size(), page::kDevices));
+  header.devices_in_all = frame.devices_in_all;
+  for (std::size_t i = 0; i < header.devices; ++i) header.device[i] = row_of(frame.devices[i], tasks);
   put(header);
   for (std::size_t d = 0; d < dags; ++d) {
     const DagFrame &dag = frame.dags[d];

@@ -3,6 +3,7 @@
 
 #include "redag/runtime/device_threads.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "redag/base/check.hpp"
@@ -16,13 +17,13 @@ thread_local const DeviceThreads *devices_of_this_thread = nullptr;
 
 bool DeviceThreads::is_this_thread() const { return devices_of_this_thread == this; }
 
-DeviceThreads::DeviceThreads(const std::vector<Device> &devices) : devices_(devices), idle_(devices.size()) {
+DeviceThreads::DeviceThreads(const std::vector<Device> &devices) : devices_(devices), states_(devices.size()) {
   for (std::size_t d = 0; d < devices.size(); ++d) {
     for (std::uint32_t slot = 0; slot < devices[d].slots; ++slot) {
       threads_.push_back(std::make_unique<DeviceThread>());
       threads_.back()->device = DeviceId(d);
     }
-    idle_[d].reserve(devices[d].slots);
+    states_[d].idle.reserve(devices[d].slots);
   }
 }
 
@@ -33,7 +34,7 @@ Result<void> DeviceThreads::start(const std::string &name, int priority, const S
         start_thread({its_name, priority, {}}, [this, served, &self = *thread] { main(self, served); });
     if (!started) return tl::unexpected(started.error());
     thread->handle = *std::move(started);
-    add_idle(*thread);
+    states_[thread->device.value].idle.push_back(thread.get());
   }
   return {};
 }
@@ -44,17 +45,44 @@ void DeviceThreads::end() {
     thread->parker.unpark();
     if (thread->handle.joinable()) thread->handle.join();
   }
-  for (auto &idle : idle_) idle.clear();
+  for (State &state : states_) state.idle.clear();
   ending_.store(false, std::memory_order_release);
 }
 
-void DeviceThreads::serve(detail::Wait &wait) {
-  auto &idle = idle_[wait.device.value];
-  REDAG_CHECK(!idle.empty(), "a device serves more jobs than it has slots");
-  DeviceThread &thread = *idle.back();
-  idle.pop_back();
+void DeviceThreads::serve(detail::Wait &wait, TaskId task, Time now) {
+  State &state = states_[wait.device.value];
+  REDAG_CHECK(!state.idle.empty(), "a device serves more jobs than it has slots");
+  DeviceThread &thread = *state.idle.back();
+  state.idle.pop_back();
+  --state.queued;
+  thread.task = task;
+  thread.since = now;
   thread.wait = &wait;
   thread.parker.unpark();
+}
+
+void DeviceThreads::end_service(DeviceThread &thread, Time now) {
+  State &state = states_[thread.device.value];
+  ++state.served;
+  state.busy += std::max<Duration>(0, now - thread.since);
+  thread.task = TaskId();
+  state.idle.push_back(&thread);
+}
+
+void DeviceThreads::figures(Time now, std::vector<DeviceFigures> &out) const {
+  out.resize(states_.size());
+  for (std::size_t d = 0; d < states_.size(); ++d) {
+    out[d].queued = states_[d].queued;
+    out[d].served = states_[d].served;
+    out[d].busy = states_[d].busy;
+    out[d].serves.clear();
+  }
+  for (const auto &thread : threads_) {
+    if (!thread->task.valid()) continue;
+    DeviceFigures &device = out[thread->device.value];
+    device.busy += std::max<Duration>(0, now - thread->since);
+    device.serves.push_back(thread->task);
+  }
 }
 
 void DeviceThreads::main(DeviceThread &self, const Served &served) noexcept {

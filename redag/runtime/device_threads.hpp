@@ -6,6 +6,7 @@
 // engine's lock, except start() and end(), which are for one thread at a time.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
@@ -20,8 +21,18 @@
 
 namespace redag::runtime {
 
+/// The figures of one device for a live view.
+struct DeviceFigures {
+  std::uint32_t queued = 0;    // jobs that asked it and are not served yet
+  std::uint64_t served = 0;    // services that have ended
+  Duration busy = 0;           // time of all its services, in progress or ended
+  std::vector<TaskId> serves;  // the tasks of the jobs that it serves now
+};
+
 struct DeviceThread {
   DeviceId device;
+  TaskId task;     // of the job that it serves; not valid: it is idle
+  Time since = 0;  // when this service began
   Parker parker;
   detail::Wait *wait = nullptr;  // to be served; written before a token is left, while the thread is idle
   ThreadHandle handle;
@@ -39,18 +50,32 @@ class DeviceThreads {
   /// Tells the threads to end, and waits for them. None serves a job. start() can be called again.
   void end();
 
-  /// Lets an idle thread of the device serve. The scheduler has found a free slot.
-  void serve(detail::Wait &wait);
+  /// A job asks the device.
+  void join(DeviceId device) { ++states_[device.value].queued; }
+  /// The job leaves the queue unserved, because its wait is cancelled.
+  void leave(DeviceId device) { --states_[device.value].queued; }
+  /// Lets an idle thread of the device serve a job of `task` that has asked it. The scheduler has found a free slot.
+  void serve(detail::Wait &wait, TaskId task, Time now);
+  /// The thread has served a job.
+  void end_service(DeviceThread &thread, Time now);
   /// Returns true if the calling thread is one of them. After start().
   [[nodiscard]] bool is_this_thread() const;
-  void add_idle(DeviceThread &thread) { idle_[thread.device.value].push_back(&thread); }
+  /// Sets the figures of all devices, by DeviceId, without allocating if each `serves` has room for the slots.
+  void figures(Time now, std::vector<DeviceFigures> &out) const;
 
  private:
+  struct State {
+    std::vector<DeviceThread *> idle;
+    std::uint32_t queued = 0;
+    std::uint64_t served = 0;
+    Duration busy = 0;  // of services that have ended
+  };
+
   void main(DeviceThread &self, const Served &served) noexcept;
 
   std::vector<Device> devices_;
   std::vector<std::unique_ptr<DeviceThread>> threads_;
-  std::vector<std::vector<DeviceThread *>> idle_;  // by DeviceId
+  std::vector<State> states_;  // by DeviceId
   Atomic<bool> ending_{false};
 };
 

@@ -105,6 +105,7 @@ struct TaskFigures {
   Usage usage;
   int priority = 0;          // os: SCHED_FIFO priority of its jobs that have inherited nothing
   std::uint32_t active = 0;  // jobs that have started and not ended
+  std::uint32_t away = 0;    // of these, jobs that wait without a worker
   std::uint32_t ready = 0;
   std::uint32_t most_waits = 0;       // of a job
   Duration longest_waits = 0;         // of a job, together: from each co_await until it is woken
@@ -228,6 +229,8 @@ class Engine {
   [[nodiscard]] TaskFigures figures(TaskId task) const;
   /// Replaces `out` by the figures of all worker threads, in their order.
   void figures(std::vector<ThreadFigures> &out) const;
+  /// Replaces `out` by the figures of all devices, by DeviceId.
+  void figures(std::vector<DeviceFigures> &out) const;
   /// For how long jobs that are not of high criticality were demoted to ordinary threads because of throttling.
   [[nodiscard]] Duration gave_way() const;
   /// How often a job could have had a processor but waited for a thread, because all threads had jobs.

@@ -141,6 +141,7 @@ TaskFigures Engine::figures(TaskId task) const {
                       .usage = entry.usage,
                       .priority = os() && level != sched::kNoLevel ? placement_.priority_of_level(level) : 0,
                       .active = entry.busy,
+                      .away = entry.away,
                       .ready = scheduler_->ready(task),
                       .most_waits = entry.most_waits,
                       .longest_waits = entry.longest_waits,
@@ -162,6 +163,13 @@ void Engine::figures(std::vector<ThreadFigures> &out) const {
   for (const auto &thread : pool_.threads()) {
     out.push_back({thread->used, thread->stack.empty() ? TaskId() : thread->stack.back().task});
   }
+}
+
+void Engine::figures(std::vector<DeviceFigures> &out) const {
+  out.resize(options_.devices.size());
+  for (std::size_t d = 0; d < out.size(); ++d) out[d].serves.reserve(options_.devices[d].slots);
+  const LockGuard guard(lock_);
+  devices_.figures(now(), out);
 }
 
 }  // namespace redag::runtime

@@ -173,7 +173,7 @@ Time Engine::wake_sleepers() {
 void Engine::end_service(DeviceThread &thread, JobSlot job) {
   const Time at = now();
   Locked locked(*this);
-  waiting_.end_service(thread);
+  waiting_.end_service(thread, at);
   wake(locked, job, at);
   decide(locked, at);
 }

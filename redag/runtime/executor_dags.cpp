@@ -265,6 +265,7 @@ void Executor::Impl::sample(live::Sample &sample) const {
     }
   }
   add_threads(sample, *engine_);
+  add_devices(sample, *engine_);
   sample.alert = engine_->order_problem();
 }
 

@@ -42,7 +42,7 @@ void JobPlacement::place(const sched::Step &step, const Situation &situation, Ta
     if (&dispatch == own) continue;
     if (!needs_thread(dispatch)) {
       if (dispatch.kind == DispatchKind::Serve) {
-        waiting_.serve(dispatch.job);
+        waiting_.serve(dispatch.job, situation.now);
         continue;
       }
       if (const WaitingJob *woken = find_woken(dispatch)) {

@@ -17,6 +17,7 @@ void fill(live::TaskSample &sample, const TaskFigures &figures) {
   sample.cpu = figures.usage.total;
   sample.priority = figures.priority;
   sample.active = figures.active;
+  sample.away = figures.away;
   sample.ready = figures.ready;
   const std::uint64_t started_or_ready = std::uint64_t{figures.active} + figures.ready;
   const std::uint64_t in_flight = jobs.in_flight();
@@ -33,6 +34,21 @@ void add_threads(live::Sample &sample, const Engine &engine, std::span<const Tas
     live::ThreadSample &added = sample.threads.emplace_back();
     added.used = thread.used;
     if (thread.task.valid()) added.task = ids.empty() ? thread.task.value : ids[thread.task.value].value;
+  }
+}
+
+void add_devices(live::Sample &sample, const Engine &engine) {
+  std::vector<DeviceFigures> devices;
+  engine.figures(devices);
+  for (std::size_t d = 0; d < devices.size(); ++d) {
+    const Device &device = engine.options().devices[d];
+    live::DeviceSample &added = sample.devices.emplace_back();
+    added.name = device.name;
+    added.slots = device.slots;
+    added.queued = devices[d].queued;
+    added.served = devices[d].served;
+    added.busy = devices[d].busy;
+    for (const TaskId task : devices[d].serves) added.serves.push_back(task.value);
   }
 }
 

@@ -19,6 +19,9 @@ void fill(live::TaskSample &sample, const TaskFigures &figures);
 /// Appends the threads of `engine`. A task's key is its id, or that of `ids` at its id's place.
 void add_threads(live::Sample &sample, const Engine &engine, std::span<const TaskId> ids = {});
 
+/// Appends the devices of `engine`. A task's key is its id.
+void add_devices(live::Sample &sample, const Engine &engine);
+
 [[nodiscard]] live::PublisherOptions live_options(const std::string &name, const std::string &driver, const Mode &mode,
                                                   const sched::Config &config);
 

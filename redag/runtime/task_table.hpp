@@ -95,6 +95,7 @@ struct TaskEntry {
   std::uint64_t kept_worker = 0;  // calls that block for which no thread was left
   std::uint32_t concurrency = 0;  // jobs that can be in progress at once
   std::uint32_t busy = 0;         // jobs that have started and not ended
+  std::uint32_t away = 0;         // of these, jobs that wait without a worker
   std::uint32_t short_jobs = 0;   // consecutive short jobs up to now; at most kStreak
   std::uint32_t tiny_score = 0;   // a tiny job adds 3, another one takes 1
   bool removed = false;

@@ -4,6 +4,7 @@
 #include "redag/runtime/waiting_jobs.hpp"
 
 #include <algorithm>
+#include <bit>
 
 #include "redag/base/check.hpp"
 #include "redag/runtime/clock.hpp"
@@ -21,8 +22,20 @@ void WaitingJobs::reserve(std::size_t jobs) {
   cancelled_.reserve(jobs);
 }
 
+void WaitingJobs::add(WaitingJob &job, Time now) {
+  job.since = now;
+  ++job.entry->away;
+  const std::size_t slot = job.job.slot.value;
+  if (slot >= by_slot_.size()) by_slot_.resize(std::bit_ceil(slot + 1), nullptr);
+  by_slot_[slot] = &job;
+  ++count_;
+}
+
 bool WaitingJobs::begin(detail::Wait &wait) {
-  if (wait.kind == detail::Wait::Kind::Device) return true;
+  if (wait.kind == detail::Wait::Kind::Device) {
+    devices_.join(wait.device);
+    return true;
+  }
   if (stopped_ || by_slot_[wait.job.value]->entry->waits_end) {
     wait.cancelled = true;
     return false;
@@ -48,6 +61,7 @@ void WaitingJobs::end(JobSlot slot, Time now) {
     job.wait->is_over = true;
     if (job.wait->until != kNever) forget_alarm(*job.wait, slot);
   }
+  --job.entry->away;
   job.waited += std::max<Duration>(0, now - job.since);
   job.entry->most_waits = std::max(job.entry->most_waits, ++job.waits);
   job.entry->longest_waits = std::max(job.entry->longest_waits, job.waited);
@@ -72,9 +86,11 @@ JobSlot WaitingJobs::take_sleeper() {
   return first;
 }
 
-void WaitingJobs::serve(JobSlot slot) {
-  detail::Wait &wait = *by_slot_[slot.value]->wait;
-  if (!stopped_) return devices_.serve(wait);
+void WaitingJobs::serve(JobSlot slot, Time now) {
+  const WaitingJob &job = *by_slot_[slot.value];
+  detail::Wait &wait = *job.wait;
+  if (!stopped_) return devices_.serve(wait, job.job.task, now);
+  devices_.leave(wait.device);
   wait.cancelled = true;
   cancelled_.push_back(slot);
 }

@@ -7,7 +7,6 @@
 // engine's lock guards it.
 #pragma once
 
-#include <bit>
 #include <cstddef>
 #include <vector>
 
@@ -55,13 +54,7 @@ class WaitingJobs {
   void reserve(std::size_t jobs);
 
   /// The job has left its thread, and waits or is woken.
-  void add(WaitingJob &job, Time now) {
-    job.since = now;
-    const std::size_t slot = job.job.slot.value;
-    if (slot >= by_slot_.size()) by_slot_.resize(std::bit_ceil(slot + 1), nullptr);
-    by_slot_[slot] = &job;
-    ++count_;
-  }
+  void add(WaitingJob &job, Time now);
   /// The job has a thread from now on.
   void remove(JobSlot slot) {
     by_slot_[slot.value] = nullptr;
@@ -80,15 +73,15 @@ class WaitingJobs {
     }
   }
 
-  /// Begins the wait of a job, except at a device, where it queues first. Returns false if the wait is over already.
+  /// Begins the wait of a job; at a device it queues first. Returns false if the wait is over already.
   [[nodiscard]] bool begin(detail::Wait &wait);
   /// The wait of a job is over: it is woken. A call that blocks is not begun here, and cannot be cancelled.
   void end(JobSlot slot, Time now);
   /// A device has a slot for the job: a thread of the device begins to serve it. After cancel_all() the job's wait is
   /// cancelled instead.
-  void serve(JobSlot slot);
+  void serve(JobSlot slot, Time now);
   /// A thread of a device has served a job.
-  void end_service(DeviceThread &thread) { devices_.add_idle(thread); }
+  void end_service(DeviceThread &thread, Time now) { devices_.end_service(thread, now); }
 
   /// When the first sleeper is to be woken (CLOCK_MONOTONIC); kNever: there is none.
   [[nodiscard]] Time next_alarm() const { return sleepers_.empty() ? kNever : sleepers_.front().until; }

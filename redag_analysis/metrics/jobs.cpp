@@ -49,6 +49,7 @@ void JobFolder::add(const JobEvent &event) {
     job.record.release = event.value;
     job.record.seen = event.time;
     job.record.deadline = event.value + task.deadline;
+    job.stay = StayClock(event.value);
     task.live.push_back(job);
     return;
   }
@@ -65,6 +66,7 @@ void JobFolder::add(const JobEvent &event) {
     case JobEventKind::Ready:
       record.ready = event.time;
       record.origin = event.value;
+      found->stay.move(Stay::Ready, event.time);
       break;
     case JobEventKind::Deferred: record.deferred = true; break;
     case JobEventKind::Dispatched:
@@ -73,20 +75,22 @@ void JobFolder::add(const JobEvent &event) {
       record.worker = event.worker;
       record.deadline = event.value;
       found->on_worker_since = event.time;
+      found->stay.move(Stay::OnWorker, event.time);
       break;
     case JobEventKind::Started: record.start = event.value; break;  // exact, even if the event was delivered late
     case JobEventKind::Preempted:
       ++record.preemptions;
-      if (found->on_worker_since != kNever) record.on_worker += event.time - found->on_worker_since;
-      found->on_worker_since = kNever;
+      leave_worker(*found, Stay::Preempted, event.time);
       break;
     case JobEventKind::Waits:
-      if (found->on_worker_since != kNever) record.on_worker += event.time - found->on_worker_since;
-      found->on_worker_since = kNever;
+      leave_worker(*found, event.value < 0 ? Stay::Waits : Stay::DeviceQueue, event.time);
       break;
-    case JobEventKind::Served:
-    case JobEventKind::Woken: break;
-    case JobEventKind::Resumed: found->on_worker_since = event.time; break;
+    case JobEventKind::Served: found->stay.move(Stay::Device, event.time); break;
+    case JobEventKind::Woken: found->stay.move(Stay::Ready, event.time); break;
+    case JobEventKind::Resumed:
+      found->on_worker_since = event.time;
+      found->stay.move(Stay::OnWorker, event.time);
+      break;
     case JobEventKind::Executed: record.processor = event.value; break;
     case JobEventKind::Exceeded: record.exceeded = true; break;
     case JobEventKind::HighMode:
@@ -95,6 +99,12 @@ void JobFolder::add(const JobEvent &event) {
     case JobEventKind::Skipped:
     case JobEventKind::Aborted: end(task, static_cast<std::size_t>(found - task.live.begin()), event); break;
   }
+}
+
+void JobFolder::leave_worker(Live &job, Stay stay, Time now) {
+  if (job.on_worker_since != kNever) job.record.on_worker += now - job.on_worker_since;
+  job.on_worker_since = kNever;
+  job.stay.move(stay, now);
 }
 
 void JobFolder::end(TaskJobs &task, std::size_t index, const JobEvent &event) {
@@ -108,6 +118,8 @@ void JobFolder::end(TaskJobs &task, std::size_t index, const JobEvent &event) {
     if (job.on_worker_since != kNever) job.record.on_worker += event.value - job.on_worker_since;
   }
   job.record.reason = event.reason;
+  job.stay.end(job.record.finish);
+  job.record.split = job.stay.split();
   ended_.push_back(job.record);
   task.live.erase(task.live.begin() + static_cast<std::ptrdiff_t>(index));
 }
@@ -117,7 +129,10 @@ std::vector<JobRecord> JobFolder::take_ended() { return std::exchange(ended_, {}
 std::vector<JobRecord> JobFolder::in_flight() const {
   std::vector<JobRecord> records;
   for (const TaskJobs &task : tasks_) {
-    for (const Live &job : task.live) records.push_back(job.record);
+    for (const Live &job : task.live) {
+      records.push_back(job.record);
+      records.back().split = job.stay.split();
+    }
   }
   std::sort(records.begin(), records.end(), released_earlier);
   return records;

@@ -12,6 +12,7 @@
 
 #include "redag/model/job_event.hpp"
 #include "redag/model/workload.hpp"
+#include "redag_analysis/metrics/response_split.hpp"
 
 namespace redag::metrics {
 
@@ -39,6 +40,7 @@ struct JobRecord {
   bool exceeded = false;  // used its budget and continued; not in jobs.csv
   JobOutcome outcome = JobOutcome::InFlight;
   Reason reason = Reason::None;
+  ResponseSplit split;  // up to its last event; of a finished job the sum is its response time; not in jobs.csv
 
   [[nodiscard]] bool has_started() const { return start != kNever; }
   /// f - r and f - ready. Both require a finished job.
@@ -77,6 +79,7 @@ class JobFolder {
   struct Live {
     JobRecord record;
     Time on_worker_since = kNever;
+    StayClock stay;
   };
   struct TaskJobs {
     Duration deadline = 0;
@@ -84,6 +87,7 @@ class JobFolder {
   };
 
   void add(const JobEvent &event);
+  static void leave_worker(Live &job, Stay stay, Time now);
   void end(TaskJobs &task, std::size_t index, const JobEvent &event);
 
   std::vector<TaskJobs> tasks_;

@@ -66,7 +66,7 @@ void Group::take_first(const trace::Trace &trace, const std::vector<JobRecord> &
   end_to_end_.resize(refs.size());
   bounds_ = bounds_of(trace.info);
   schedule_ = schedule_of(trace, jobs, options_.most_slices, options_.most_views);
-  timeline_ = timeline_of(trace, slices_of(trace), jobs, options_.most_bins);
+  timeline_ = timeline_of(trace, slices_of(trace), services_of(trace), jobs, options_.most_bins);
 }
 
 void Group::take(const std::string &path, const trace::RunInfo &info, const std::vector<JobRecord> &jobs) {
@@ -111,7 +111,10 @@ void Group::finish() {
   REDAG_CHECK(!runs_.empty(), "a group without runs");
   task_stats_.assign(samples_.size(), {});
   for (std::size_t t = 0; t < samples_.size(); ++t) {
-    for (const RunDigest &run : runs_) task_stats_[t].add_counts(run.summary.tasks[t].jobs);
+    for (const RunDigest &run : runs_) {
+      task_stats_[t].add_counts(run.summary.tasks[t].jobs);
+      task_stats_[t].split.add(run.summary.tasks[t].jobs.split);
+    }
     total_.add_counts(task_stats_[t]);
     std::vector<Duration> &response = samples_[t].response;
     std::sort(response.begin(), response.end());

@@ -86,7 +86,7 @@ class Group {
   [[nodiscard]] const Timeline &timeline() const { return timeline_; }
   [[nodiscard]] const std::optional<LatestJob> &latest() const { return latest_; }
 
-  // Figures of all jobs of all runs: counts and, of a task's distributions, only `response`.
+  // Figures of all jobs of all runs: counts and, of a task's distributions, only `response` and `split`.
   [[nodiscard]] const metrics::JobStats &task(TaskId task) const { return task_stats_[task.value]; }
   [[nodiscard]] const std::vector<metrics::DagSummary> &dags() const { return dags_; }
   [[nodiscard]] const metrics::JobCounts &dag(DagId dag) const { return dags_[dag.value].jobs; }

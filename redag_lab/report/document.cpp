@@ -55,6 +55,8 @@ Json to_json(const JobCounts &jobs) {
 Json to_json(const JobStats &jobs) {
   Json json = to_json(static_cast<const JobCounts &>(jobs));
   json["response"] = to_json(jobs.response);
+  // By metrics::Stay.
+  json["split"] = {{"total_ns", jobs.split.total.length}, {"longest_ns", jobs.split.longest.length}};
   return json;
 }
 
@@ -105,8 +107,21 @@ Json to_json(const Window &window, Time end, const std::vector<Duration> &end_to
     slices["length"].push_back(slice.end - slice.begin);
     slices["how"].push_back(static_cast<int>(slice.how));
   }
-  return Json{
-      {"begin_ns", window.begin}, {"end_ns", window.end}, {"jobs", std::move(jobs)}, {"slices", std::move(slices)}};
+  Json services = columns({"task", "job", "device", "slot", "begin", "length"});
+  for (const Service &service : window.services) {
+    const auto job = index.find({service.task.value, service.job});
+    services["task"].push_back(service.task.value);
+    services["job"].push_back(job == index.end() ? Json(nullptr) : Json(job->second));
+    services["device"].push_back(service.device.value);
+    services["slot"].push_back(service.slot);
+    services["begin"].push_back(service.begin - window.begin);
+    services["length"].push_back(service.end - service.begin);
+  }
+  return Json{{"begin_ns", window.begin},
+              {"end_ns", window.end},
+              {"jobs", std::move(jobs)},
+              {"slices", std::move(slices)},
+              {"services", std::move(services)}};
 }
 
 Json to_json(const Schedule &schedule, const trace::RunInfo &run) {
@@ -130,11 +145,9 @@ Json to_json(const Schedule &schedule, const trace::RunInfo &run) {
 }
 
 Json to_json(const Timeline &timeline) {
-  return Json{{"begin_ns", timeline.begin},
-              {"bin_ns", timeline.bin},
-              {"busy_ns", timeline.busy},
-              {"released", timeline.released},
-              {"missed", timeline.missed}};
+  return Json{{"begin_ns", timeline.begin},    {"bin_ns", timeline.bin},
+              {"busy_ns", timeline.busy},      {"device_busy_ns", timeline.device_busy},
+              {"released", timeline.released}, {"missed", timeline.missed}};
 }
 
 Json to_json(const RunDigest &run) {
@@ -216,6 +229,7 @@ class GroupWriter {
                 {"verdict", std::move(verdict)},
                 {"total", to_json(group_.total())},
                 {"clusters", clusters()},
+                {"devices", devices()},
                 {"dags", dags()},
                 {"tasks", tasks()},
                 {"bounds",
@@ -241,6 +255,14 @@ class GroupWriter {
     Json rows = Json::array();
     for (const Cluster &cluster : group_.workload().platform.clusters) {
       rows.push_back(Json{{"name", cluster.name}, {"workers", cluster.workers}});
+    }
+    return rows;
+  }
+
+  Json devices() const {
+    Json rows = Json::array();
+    for (const Device &device : group_.workload().platform.devices) {
+      rows.push_back(Json{{"name", device.name}, {"slots", device.slots}});
     }
     return rows;
   }

@@ -103,6 +103,7 @@ TEST(Page, HasWordsForEveryNameThatTheProgramWrites) {
   EXPECT_EQ(keys_of(assets::kScript, "REASONS"), names_to(kLastReason));
   EXPECT_EQ(keys_of(assets::kScript, "OUTCOMES"), names_to(JobOutcome::Aborted));
   EXPECT_EQ(keys_of(assets::kScript, "TONES"), names_to(Tone::Plain));
+  EXPECT_EQ(keys_of(assets::kScript, "STAYS"), names_to(metrics::Stay::Waits));
   EXPECT_EQ(keys_of(assets::kScript, "ENDS"),
             (std::vector<std::string>{"finished", "aborted", "preempted", "open", "waits"}));
   static_assert(static_cast<int>(Slice::End::Finished) == 0 && static_cast<int>(Slice::End::Aborted) == 1 &&

@@ -74,7 +74,11 @@ Time end_of(const JobRecord &job, Time run_end) { return job.finish == kNever ? 
 class Chooser {
  public:
   Chooser(const trace::Trace &trace, std::span<const JobRecord> jobs, std::size_t most)
-      : trace_(trace), jobs_(jobs), most_(std::max<std::size_t>(most, 1)), slices_(slices_of(trace)) {
+      : trace_(trace),
+        jobs_(jobs),
+        most_(std::max<std::size_t>(most, 1)),
+        slices_(slices_of(trace)),
+        services_(services_of(trace)) {
     begin_ = trace.info.start;
     end_ = trace.info.end;
     for (const Slice &slice : slices_) end_ = std::max(end_, slice.end);
@@ -151,7 +155,7 @@ class Chooser {
 
   // Returns the jobs and slices in [begin, end]. The window is cut short if they exceed a share.
   Window window(Time begin, Time end, std::size_t share) const {
-    Window window{begin, end, {}, {}};
+    Window window{begin, end, {}, {}, {}};
     for (const JobRecord &job : jobs_) {
       if (job.release >= window.end || end_of(job, end_) < begin) continue;
       if (window.jobs.size() == 2 * share) {
@@ -164,6 +168,10 @@ class Chooser {
       if (slice.begin > window.end) break;
       if (slice.end >= begin) window.slices.push_back(slice);
     }
+    for (const Service &service : services_) {
+      if (service.begin > window.end) break;
+      if (service.end >= begin) window.services.push_back(service);
+    }
     return window;
   }
 
@@ -171,6 +179,7 @@ class Chooser {
   std::span<const JobRecord> jobs_;
   std::size_t most_;
   std::vector<Slice> slices_;
+  std::vector<Service> services_;
   Time begin_ = 0;
   Time end_ = 0;
 };

@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The schedule as a picture: which job held which worker when. Of a run too long to draw, it keeps the interesting
-// stretches: the beginning, and the job of each DAG closest to its deadline or latest after it. Pure functions.
+// The schedule as a picture: which job held which worker, and which device, when. Of a run too long to draw, it keeps
+// the interesting stretches: the beginning, and the job of each DAG closest to its deadline or latest after it. Pure
+// functions.
 #pragma once
 
 #include <cstdint>
@@ -11,6 +12,7 @@
 
 #include "redag/trace/trace.hpp"
 #include "redag_analysis/metrics/jobs.hpp"
+#include "redag_lab/report/services.hpp"
 
 namespace redag::report {
 
@@ -36,6 +38,7 @@ struct Window {
   Time begin = 0;
   Time end = 0;
   std::vector<Slice> slices;             // overlapping the window, in order of their begin
+  std::vector<Service> services;         // the same of devices; each follows a slice
   std::vector<metrics::JobRecord> jobs;  // alive in the window, in order of release
 };
 

@@ -107,7 +107,7 @@ TEST(Timeline, BusyTimeAndJobsAddUp) {
   const trace::Trace trace = simulated(hi_and_lo(), ms(777));
   const std::vector<Slice> slices = slices_of(trace);
   const std::vector<JobRecord> jobs = jobs_of(trace);
-  const Timeline timeline = timeline_of(trace, slices, jobs, 100);
+  const Timeline timeline = timeline_of(trace, slices, {}, jobs, 100);
   EXPECT_LE(timeline.bins, 100U);
   Duration drawn = 0;
   for (const auto &dag : timeline.busy) {
@@ -135,7 +135,7 @@ TEST(Timeline, MissesStandWhereTheirJobsWereReleased) {
   run.at(60).arrives("h", 3).dispatched("h", 3, 0, 70);                                     // overdue at the end
   run.at(95).arrives("l", 0);                                                               // still in time
   const trace::Trace trace = run.until(100);
-  const Timeline timeline = timeline_of(trace, slices_of(trace), jobs_of(trace), 10);
+  const Timeline timeline = timeline_of(trace, slices_of(trace), {}, jobs_of(trace), 10);
   ASSERT_EQ(timeline.bins, 10U);
   EXPECT_EQ(timeline.missed[0], (std::vector<std::uint64_t>{1, 0, 1, 0, 0, 0, 1, 0, 0, 0}));
   EXPECT_EQ(timeline.missed[1], std::vector<std::uint64_t>(10, 0));

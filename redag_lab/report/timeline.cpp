@@ -15,8 +15,8 @@ using metrics::JobRecord;
 
 }  // namespace
 
-Timeline timeline_of(const trace::Trace &trace, std::span<const Slice> slices, std::span<const JobRecord> jobs,
-                     std::size_t most_bins) {
+Timeline timeline_of(const trace::Trace &trace, std::span<const Slice> slices, std::span<const Service> services,
+                     std::span<const JobRecord> jobs, std::size_t most_bins) {
   REDAG_CHECK(most_bins > 0, "a timeline of nothing");
   Timeline timeline;
   timeline.begin = trace.info.start;
@@ -28,24 +28,30 @@ Timeline timeline_of(const trace::Trace &trace, std::span<const Slice> slices, s
 
   const std::size_t dags = trace.info.workload.dags.size();
   timeline.busy.assign(dags, std::vector<Duration>(timeline.bins, 0));
+  timeline.device_busy.assign(trace.info.workload.platform.devices.size(), std::vector<Duration>(timeline.bins, 0));
   timeline.released.assign(dags, std::vector<std::uint64_t>(timeline.bins, 0));
   timeline.missed = timeline.released;
   const auto bin_at = [&](Time time) {
     const Duration since = std::clamp<Duration>(time - timeline.begin, 0, length - 1);
     return static_cast<std::size_t>(since / timeline.bin);
   };
-  const std::vector<TaskRef> refs = flatten(trace.info.workload);
-  for (const Slice &slice : slices) {
-    std::vector<Duration> &busy = timeline.busy[refs[slice.task.value].dag.value];
+  const auto fill = [&](std::vector<Duration> &busy, Time begin, Time end) {
     // A job in progress at the end may have run longer, outside the timeline.
-    const Time end = std::min(slice.end, trace.info.end);
-    Time from = std::max(slice.begin, timeline.begin);
+    end = std::min(end, trace.info.end);
+    Time from = std::max(begin, timeline.begin);
     while (from < end) {
       const std::size_t bin = bin_at(from);
       const Time until = std::min(end, timeline.begin + static_cast<Duration>(bin + 1) * timeline.bin);
       busy[bin] += until - from;
       from = until;
     }
+  };
+  const std::vector<TaskRef> refs = flatten(trace.info.workload);
+  for (const Slice &slice : slices) {
+    fill(timeline.busy[refs[slice.task.value].dag.value], slice.begin, slice.end);
+  }
+  for (const Service &service : services) {
+    fill(timeline.device_busy[service.device.value], service.begin, service.end);
   }
   for (const JobRecord &job : jobs) {
     const std::size_t dag = refs[job.task.value].dag.value;

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // A run of any length at a glance. For each of a fixed number of equal stretches of time it holds each DAG's time on
-// workers and its missed deadlines. Pure functions.
+// workers and its missed deadlines, and each device's time in use. Pure functions.
 #pragma once
 
 #include <cstdint>
@@ -20,6 +20,7 @@ struct Timeline {
   Duration bin = 1;  // length of a stretch; the last one can extend past the end of the run
   std::size_t bins = 0;
   std::vector<std::vector<Duration>> busy;           // by DagId, then by stretch: time on workers, over all workers
+  std::vector<std::vector<Duration>> device_busy;    // by DeviceId, then by stretch: time of services, over all slots
   std::vector<std::vector<std::uint64_t>> released;  // jobs by the stretch of their release
   std::vector<std::vector<std::uint64_t>> missed;    // of these: late, overdue, skipped or aborted (not without data)
 };
@@ -27,6 +28,7 @@ struct Timeline {
 /// Returns at most `most_bins` stretches of whole microseconds (or shorter ones, for very short runs). Requires
 /// most_bins > 0.
 [[nodiscard]] Timeline timeline_of(const trace::Trace &trace, std::span<const Slice> slices,
-                                   std::span<const metrics::JobRecord> jobs, std::size_t most_bins);
+                                   std::span<const Service> services, std::span<const metrics::JobRecord> jobs,
+                                   std::size_t most_bins);
 
 }  // namespace redag::report

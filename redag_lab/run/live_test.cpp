@@ -9,7 +9,10 @@
 #include <thread>
 
 #include "redag/live/reader.hpp"
+#include "redag/runtime/async_event.hpp"
 #include "redag/runtime/clock.hpp"
+#include "redag/runtime/coroutine.hpp"
+#include "redag/runtime/device_handle.hpp"
 #include "redag/runtime/executor.hpp"
 #include "redag/runtime/live_sample.hpp"
 #include "redag/sched/priority_scheduler.hpp"
@@ -184,6 +187,56 @@ TEST(LiveExecutor, IsSeenWhileItRuns) {
   EXPECT_EQ(frame.threads_in_all, 1U);
   executor.stop();
   EXPECT_FALSE(own_page("live-test"));
+}
+
+TEST(LiveExecutor, ShowsJobsThatWaitAndTheirDevices) {
+  runtime::ExecutorOptions options;
+  options.name = "waits-test";
+  options.workers = 1;
+  options.preemption = PreemptionMode::None;
+  options.live = true;
+  options.devices = {{.name = "gpu"}, {.name = "dla", .slots = 2}};
+  runtime::Event go;
+  AsyncEvent never;
+  runtime::Executor executor(options);
+  const runtime::DeviceHandle gpu = executor.device("gpu");
+  runtime::DagBuilder camera("camera");
+  // One job of each of the first two: one is served until the test says so, and the other one queues.
+  camera.timer("first", 1h, [&]() -> Coroutine { co_await gpu.run([&] { go.wait(); }); });
+  camera.timer("second", 2h, [&]() -> Coroutine { co_await gpu.run([] {}); });
+  camera.timer("asleep", 3h, [&]() -> Coroutine { co_await never; });
+  executor.add(std::move(camera));
+  executor.start();
+  const auto page_when = [](auto is_so) {
+    for (;;) {
+      std::optional<live::Page> page = own_page("waits-test");
+      if (page && page->frame.tasks.size() == 3 && is_so(page->frame)) return *std::move(page);
+      std::this_thread::sleep_for(10ms);
+    }
+  };
+  const auto away = [](const live::Frame &frame) { return frame.dags[0].figures.away; };
+  const live::Page waiting = page_when([&](const live::Frame &frame) { return away(frame) == 3; });
+  go.set();
+  EXPECT_EQ(waiting.frame.tasks[1].figures.active, 1U);
+  EXPECT_EQ(waiting.frame.tasks[1].figures.away, 1U);
+  EXPECT_EQ(waiting.frame.devices_in_all, 2U);
+  ASSERT_EQ(waiting.frame.devices.size(), 2U);
+  EXPECT_EQ(waiting.frame.devices[0].name, "gpu");
+  EXPECT_EQ(waiting.frame.devices[0].used, 1U);
+  EXPECT_EQ(waiting.frame.devices[0].queued, 1U);
+  EXPECT_EQ(waiting.frame.devices[0].served, 0U);
+  EXPECT_GT(waiting.frame.devices[0].busy, 0) << "the service in progress";
+  EXPECT_EQ(waiting.frame.devices[0].tasks, std::vector<std::uint32_t>{0});
+  EXPECT_EQ(waiting.frame.devices[1].slots, 2U);
+  EXPECT_EQ(waiting.frame.devices[1].used, 0U);
+  EXPECT_EQ(waiting.frame.threads[0].task, std::nullopt) << "the worker is free";
+  const live::Page served = page_when([&](const live::Frame &frame) { return away(frame) == 1; });
+  EXPECT_EQ(served.frame.devices[0].used, 0U);
+  EXPECT_EQ(served.frame.devices[0].queued, 0U);
+  EXPECT_EQ(served.frame.devices[0].served, 2U);
+  EXPECT_GT(served.frame.devices[0].busy, 0);
+  EXPECT_EQ(served.frame.tasks[2].figures.away, 1U);
+  executor.stop();
 }
 
 TEST(LiveExecutor, IsNotSeenUnasked) {

@@ -231,6 +231,8 @@ class Run {
                                               }
                                               for (const auto &instance : instances_)
                                                 add_threads(sample, *instance->engine, instance->part.tasks);
+                                              // Clusters have none.
+                                              add_devices(sample, *instances_.front()->engine);
                                             });
     if (publisher) {
       live_ = *std::move(publisher);

@@ -195,6 +195,7 @@ void TaskTable::sample(const redag::runtime::Engine &engine, const std::map<std:
                        redag::live::Sample &sample) const {
   for (const redag::Dag &dag : dags_) sample.dags.push_back({dag.name, dag.max_active, dag.deadline});
   redag::runtime::add_threads(sample, engine);
+  redag::runtime::add_devices(sample, engine);
   struct Row {
     std::shared_ptr<Callback> callback;
     redag::live::TaskSample task;

@@ -23,14 +23,14 @@ import unittest
 
 import pyte
 
-from program import PROGRAM, Case, main, redag
+from program import PROGRAM, SOURCE, Case, main, redag
 
 
 class Top(Case):
     """Watches a live executor from outside. Other executors may run on this machine: each test looks for its own."""
 
-    def start(self, *arguments):
-        process = subprocess.Popen([PROGRAM, "run", self.cart, "--duration", "1h", "--json", *map(str, arguments)],
+    def start(self, *arguments, workload=None):
+        process = subprocess.Popen([PROGRAM, "run", workload or self.cart, "--duration", "1h", "--json", *map(str, arguments)],
                                    stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         self.addCleanup(process.communicate)
         self.addCleanup(process.kill)
@@ -88,6 +88,24 @@ class Top(Case):
         process.wait(timeout=100)
         self.assertFalse(self.page(process).exists())
         self.expect(redag("top", process.pid, "--once"), 1, "no live page")
+
+    def test_devices_and_jobs_that_wait(self):
+        process = self.start("--preemption", "none", workload=SOURCE / "workloads" / "perception.yaml")
+        frame = self.frame_of(process, lambda f: f["devices"] and f["devices"][0]["served"] > 3
+                              and sum(dag["away"] for dag in f["dags"]) > 0)
+        gpu, = frame["devices"]
+        self.assertEqual((frame["devices_in_all"], gpu["name"], gpu["slots"]), (1, "gpu", 1))
+        self.assertGreater(gpu["busy_ns"], 0)
+        self.assertGreaterEqual(gpu["busy_ns"], gpu["recent"]["busy_ns"])
+        for task in frame["tasks"]:
+            self.assertLessEqual(task["away"], task["active"])
+            self.assertTrue(task["away"] == 0 or task["name"] in ("detect", "segment", "update"), task["name"])
+        served = self.frame_of(process, lambda f: f["devices"][0]["tasks"])["devices"][0]
+        self.assertEqual(served["used"], 1)
+        self.assertIn(served["tasks"][0], ("camera.detect", "lidar.segment", "map.update"))
+        text = self.expect(redag("top", process.pid, "--once"), 0).stdout
+        self.assertRegex(text, r"device +busy +slots +queue +served/s +serves\ngpu +\[.+%\] +[01]/1 +\d")
+        self.assertRegex(text, r"\d jobs? waits? without a worker")
 
     def test_a_run_can_hide(self):
         process = self.start("--no-live")

@@ -51,6 +51,12 @@ void live_page_target(std::string_view input) {
   for (const live::TaskFrame &task : page->frame.tasks) {
     REDAG_CHECK(task.dag < page->frame.dags.size(), "a task is of a DAG that is there");
   }
+  for (const live::DeviceFrame &device : page->frame.devices) {
+    REDAG_CHECK(device.used <= device.slots, "a device has the slots that it uses");
+    for (const std::uint32_t task : device.tasks) {
+      REDAG_CHECK(task < page->frame.tasks.size(), "a device serves a task that is there");
+    }
+  }
 }
 
 }  // namespace redag::fuzz

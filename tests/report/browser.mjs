@@ -69,7 +69,7 @@ await test('phone: nothing is wider than the screen', async () => {
     const width = await page.evaluate(() => document.documentElement.scrollWidth);
     assert.ok(width <= 390, `${name} is ${width} wide`);
     await assertAllDrawn(page, FIGURES[name]);
-    if (name === 'comparison') await page.screenshot({path: shot('phone'), fullPage: true});
+    if (['comparison', 'perception'].includes(name)) await page.screenshot({path: shot(name === 'comparison' ? 'phone' : `${name}-phone`), fullPage: true});
     none(problems);
     await close();
   }
@@ -158,6 +158,39 @@ await test('why: the parts of a job sum to its time, and a click in the schedule
     none(problems);
     await close();
   }
+});
+
+await test('perception: devices have rows, and the parts of a response sum to it', async () => {
+  const {page, problems, close} = await open('perception');
+  const groups = await page.evaluate(() => JSON.parse(document.getElementById('data').textContent).groups);
+  for (const {name, jobs} of groups[0].tasks) {
+    const sum = (lengths) => lengths.reduce((a, b) => a + b, 0);
+    assert.equal(sum(jobs.split.longest_ns), jobs.response.max_ns, name);
+    assert.ok(Math.abs(sum(jobs.split.total_ns) / jobs.response.count - jobs.response.mean_ns) <= 1, name);
+  }
+  const table = page.locator('h3#parts ~ div .table').first();
+  assert.match((await table.locator('thead').innerText()), /at a device/);
+  assert.match(await table.locator('tbody tr', {hasText: 'camera.detect'}).innerText(), /\bms\b/);
+  const mean = await table.innerText();
+  await page.getByRole('button', {name: 'longest response', exact: true}).click();
+  assert.notEqual(await page.locator('h3#parts ~ div .table').first().innerText(), mean);
+  const figure = page.locator('figure[data-figure=schedule] .chart');
+  await figureShot(page, 'schedule', 'devices-tasks');
+  const height = (await figure.boundingBox()).height;
+  await page.getByRole('button', {name: 'workers and devices', exact: true}).click();
+  assert.notEqual((await figure.boundingBox()).height, height);
+  await figureShot(page, 'schedule', 'devices-workers');
+  // Somewhere in the row of the device, the last one above the axis, a job is served.
+  const {width, height: rows} = await figure.boundingBox();
+  let seen = '';
+  for (let x = 0.1; x < 0.95 && !/gpu: /.test(seen); x += 0.01) {
+    await figure.hover({position: {x: width * x, y: rows - 82}});
+    await page.waitForTimeout(10);
+    seen = (await page.locator('.tip:visible').allInnerTexts()).join(' ');
+  }
+  assert.match(seen, /(camera|lidar|map)\.[^]*gpu: /);
+  none(problems);
+  await close();
 });
 
 await test('experiment: each choice changes its figures', async () => {

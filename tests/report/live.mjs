@@ -143,6 +143,37 @@ await test('controls: filter, order, DAGs only, since the start', async () => {
   await close();
 });
 
+// Links to a page and its processes stay until the end, so this executor comes after the tests that expect one only.
+async function withDevices(options, body) {
+  const perception = await start(path.join(source, 'workloads', 'perception.yaml'));
+  const {page, problems, close} = await open(options);
+  await page.waitForFunction(() => document.querySelectorAll('select option').length === 2);
+  await page.getByLabel('executor', {exact: true}).selectOption(String(perception.pid));
+  await page.waitForFunction(() => /[1-9]/.test(document.querySelector('.device-table .share')?.innerText ?? ''));
+  await body(page);
+  none(problems);
+  await close();
+  await perception.kill();
+  fs.rmSync(path.join(folder, `redag.${perception.pid}.0`), {force: true});
+}
+
+await test('devices have rows of their own', () => withDevices({}, async (page) => {
+  assert.deepEqual(await page.locator('.device-table tbody th').allInnerTexts(), ['gpu']);
+  assert.match(await page.locator('.device-table tbody td').nth(1).innerText(), /^[01]\/1$/);
+  // Some job waits at some time, and the device then serves or is asked.
+  await page.waitForFunction(() => /camera|lidar|map/.test(document.querySelector('.device-table tbody td:last-child').innerText));
+  const column = (await page.locator('.live-table thead th').allInnerTexts()).indexOf('away');
+  assert.ok(column > 0);
+  await page.waitForFunction((i) => [...document.querySelectorAll('.live-table tr.dag')].some((row) => row.children[i].innerText === '1'), column);
+  await page.screenshot({path: shot('live-devices'), fullPage: true});
+}));
+
+await test('devices on a phone: nothing is wider than the screen', () => withDevices({viewport: {width: 390, height: 844}, isMobile: true, hasTouch: true, deviceScaleFactor: 2}, async (page) => {
+  const width = await page.evaluate(() => document.documentElement.scrollWidth);
+  assert.ok(width <= 390, `the page is ${width} wide`);
+  await page.screenshot({path: shot('live-devices-phone'), fullPage: true});
+}));
+
 const hostile = await start(path.join(source, 'tests', 'report', 'hostile.yaml'));
 await test('several: one is chosen; names are text; one that is killed is said to have ended', async () => {
   const {page, problems, close} = await open();

@@ -11,7 +11,7 @@ export const FIGURES = {comparison: ['missed', 'p99', 'responses', 'lateness', '
 FIGURES.experiment = ['curves', 'distance', 'bounds', 'effects'];
 FIGURES.worlds = ['curves', 'distance', 'worlds'];
 FIGURES.executors = ['worlds'];
-FIGURES.single = FIGURES.hostile = FIGURES.long = FIGURES.wide = FIGURES.comparison.slice(2);
+FIGURES.single = FIGURES.perception = FIGURES.hostile = FIGURES.long = FIGURES.wide = FIGURES.comparison.slice(2);
 
 FIGURES.hosts = ['chains', ...FIGURES.single];
 

@@ -43,7 +43,7 @@ async function violations(page) {
   return found.violations.flatMap(({id, nodes}) => nodes.slice(0, 4).map((node) => `${id}: ${node.html.slice(0, 140)}: ${node.failureSummary.split('\n')[1] || ''}`));
 }
 
-for (const name of ['comparison', 'single', 'hostile', 'experiment', 'worlds']) {
+for (const name of ['comparison', 'single', 'perception', 'hostile', 'experiment', 'worlds']) {
   await test(`${name}: axe-core finds nothing, in light and dark, on desktop and phone`, async () => {
     for (const options of [{}, {colorScheme: 'dark'}, PHONE]) {
       const {page, close} = await open(name, options);

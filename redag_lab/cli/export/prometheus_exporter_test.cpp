@@ -70,6 +70,8 @@ live::Frame frame() {
   task.spread.all[live::page::kClasses - 1] = 1;
   frame.tasks.push_back(task);
   frame.threads = {{.index = 1, .used = 250 * kMs}};
+  frame.tasks[0].figures.away = 2;
+  frame.devices = {{.name = "gpu", .slots = 4, .used = 3, .queued = 5, .served = 6, .busy = 700 * kMs}};
   return frame;
 }
 
@@ -81,15 +83,26 @@ TEST(PrometheusMetrics, AreInSecondsAndNamedByExecutorDagAndTask) {
   const std::string text = text_of({{"redag.7.1", 7, 1, live::Page{{}, frame()}}});
   const std::string executor = R"(executor="a \"cart\"",pid="7",number="1")";
   const std::string task = executor + R"(,dag="fast",task="sense")";
-  for (const std::string &line :
-       {"redag_executor_workers{" + executor + "} 2", "redag_executor_uptime_seconds{" + executor + "} 2",
-        "redag_page_age_seconds{" + executor + "} 1",
-        "redag_thread_cpu_seconds_total{" + executor + ",thread=\"1\"} 0.25",
-        "redag_jobs_released_total{" + task + "} 12", "redag_jobs_ended_total{" + task + ",outcome=\"skipped\"} 2",
-        "redag_deadline_misses_total{" + task + "} 4", "redag_cpu_seconds_total{" + task + "} 1.5",
-        "redag_jobs{" + task + ",state=\"ready\"} 1", "redag_deadline_seconds{" + task + "} 0.008",
-        "redag_response_max_seconds{" + task + "} 0.003", "redag_response_seconds_count{" + task + "} 7",
-        "redag_end_to_end_late_total{" + executor + ",dag=\"fast\"} 3", std::string("redag_unreadable_pages 0")}) {
+  for (const std::string &line : {"redag_executor_workers{" + executor + "} 2",
+                                  "redag_executor_uptime_seconds{" + executor + "} 2",
+                                  "redag_page_age_seconds{" + executor + "} 1",
+                                  "redag_thread_cpu_seconds_total{" + executor + ",thread=\"1\"} 0.25",
+                                  "redag_jobs_released_total{" + task + "} 12",
+                                  "redag_jobs_ended_total{" + task + ",outcome=\"skipped\"} 2",
+                                  "redag_deadline_misses_total{" + task + "} 4",
+                                  "redag_cpu_seconds_total{" + task + "} 1.5",
+                                  "redag_jobs{" + task + ",state=\"ready\"} 1",
+                                  "redag_deadline_seconds{" + task + "} 0.008",
+                                  "redag_response_max_seconds{" + task + "} 0.003",
+                                  "redag_response_seconds_count{" + task + "} 7",
+                                  "redag_jobs_away{" + task + "} 2",
+                                  "redag_device_slots{" + executor + ",device=\"gpu\"} 4",
+                                  "redag_device_slots_used{" + executor + ",device=\"gpu\"} 3",
+                                  "redag_device_jobs_queued{" + executor + ",device=\"gpu\"} 5",
+                                  "redag_device_served_total{" + executor + ",device=\"gpu\"} 6",
+                                  "redag_device_busy_seconds_total{" + executor + ",device=\"gpu\"} 0.7",
+                                  "redag_end_to_end_late_total{" + executor + ",dag=\"fast\"} 3",
+                                  std::string("redag_unreadable_pages 0")}) {
     EXPECT_THAT(text, HasSubstr(line + "\n"));
   }
   EXPECT_THAT(text, ::testing::Not(HasSubstr("redag_response_bound_seconds"))) << "no bound is known";

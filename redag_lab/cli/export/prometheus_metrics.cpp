@@ -86,6 +86,7 @@ struct Families {
   Family preemptions{all, MetricType::Counter, "redag_preemptions_total", "Times that a job lost its worker."};
   Family cpu{all, MetricType::Counter, "redag_cpu_seconds_total", "Processor time of jobs that ended."};
   Family jobs{all, MetricType::Gauge, "redag_jobs", "Jobs now, by state."};
+  Family away{all, MetricType::Gauge, "redag_jobs_away", "Active jobs now that wait without a worker."};
   Family response{all, MetricType::Histogram, "redag_response_seconds", "Time from a job's release to its finish."};
   Family longest{all, MetricType::Gauge, "redag_response_max_seconds",
                  "Longest response time since the executor began."};
@@ -99,6 +100,12 @@ struct Families {
                              "End-to-end deadline of a DAG."};
   Family end_to_end_late{all, MetricType::Counter, "redag_end_to_end_late_total",
                          "Answers of a DAG beyond that deadline."};
+  Family slots{all, MetricType::Gauge, "redag_device_slots", "Jobs that a device can serve at a time."};
+  Family used{all, MetricType::Gauge, "redag_device_slots_used", "Jobs that a device serves now."};
+  Family queued{all, MetricType::Gauge, "redag_device_jobs_queued", "Jobs that wait for a slot of a device now."};
+  Family served{all, MetricType::Counter, "redag_device_served_total", "Services of a device that ended."};
+  Family device_busy{all, MetricType::Counter, "redag_device_busy_seconds_total",
+                     "Time that the slots of a device were in use."};
   Family unreadable{all, MetricType::Gauge, "redag_unreadable_pages", "Live pages that the exporter could not read."};
 };
 
@@ -117,11 +124,20 @@ void add_task(Families &to, const Labels &labels, const TaskFrame &task) {
                                      std::pair("waiting", figures.waiting)}) {
     to.jobs.add(with(labels, {{"state", state}}), std::uint64_t{count});
   }
+  to.away.add(labels, std::uint64_t{figures.away});
   to.response.add(labels, task.spread);
   to.longest.add(labels, seconds(figures.response_max));
   if (task.period > 0) to.period.add(labels, seconds(task.period));
   if (task.deadline > 0) to.deadline.add(labels, seconds(task.deadline));
   if (task.bound > 0) to.bound.add(labels, seconds(task.bound));
+}
+
+void add_device(Families &to, const Labels &labels, const live::DeviceFrame &device) {
+  to.slots.add(labels, std::uint64_t{device.slots});
+  to.used.add(labels, std::uint64_t{device.used});
+  to.queued.add(labels, std::uint64_t{device.queued});
+  to.served.add(labels, device.served);
+  to.device_busy.add(labels, seconds(device.busy));
 }
 
 // Response times of a DAG are end to end.
@@ -149,6 +165,7 @@ void add_executor(Families &to, const live::Listed &listed, const Frame &frame, 
   for (const live::ThreadFrame &thread : frame.threads) {
     to.thread.add(with(labels, {{"thread", std::to_string(thread.index)}}), seconds(thread.used));
   }
+  for (const live::DeviceFrame &device : frame.devices) add_device(to, with(labels, {{"device", device.name}}), device);
   for (const DagFrame &dag : frame.dags) add_dag(to, with(labels, {{"dag", dag.name}}), dag);
   for (const TaskFrame &task : frame.tasks) {
     add_task(to, with(labels, {{"dag", frame.dags[task.dag].name}, {"task", task.name}}), task);

@@ -138,4 +138,36 @@ inline live::Listed robot_page() {
   return listed(std::move(frame), 20'817);
 }
 
+/// The robot with accelerators: some jobs wait for them, and some for answers.
+inline live::Listed accelerated_page() {
+  live::Listed robot = robot_page();
+  live::Frame &frame = robot.page->frame;
+  frame.devices_in_all = 2;
+  frame.devices = {{.name = "gpu",
+                    .slots = 1,
+                    .used = 1,
+                    .queued = 2,
+                    .served = 360'000,
+                    .recent_served = 249,
+                    .busy = 2'880 * kSecond,
+                    .recent_busy = 2'010 * kMillisecond,
+                    .tasks = {10}},
+                   {.name = "encoder",
+                    .slots = 6,
+                    .used = 5,
+                    .served = 90'000,
+                    .recent_served = 61,
+                    .busy = 1'900 * kSecond,
+                    .recent_busy = 4'800 * kMillisecond,
+                    .tasks = {13, 16, 19, 22}}};
+  for (const std::uint32_t task : {10U, 13U, 16U, 19U, 22U, 25U}) {
+    frame.tasks[task].figures.active += 1;
+    frame.tasks[task].figures.away = 1;
+    frame.dags[frame.tasks[task].dag].figures.active += 1;
+    frame.dags[frame.tasks[task].dag].figures.away += 1;
+  }
+  frame.dags[3].figures.away += 2;
+  return robot;
+}
+
 }  // namespace redag::cli::testing

@@ -116,6 +116,16 @@ double share_of(const live::ThreadFrame &thread, const Frame &frame, bool since_
                     time_of(frame, since_start));
 }
 
+double share_of(const live::DeviceFrame &device, const Frame &frame, bool since_start) {
+  return per_second(static_cast<double>(since_start ? device.busy : device.recent_busy) / 1e9 / device.slots,
+                    time_of(frame, since_start));
+}
+
+double rate_of(const live::DeviceFrame &device, const Frame &frame, bool since_start) {
+  return per_second(static_cast<double>(since_start ? device.served : device.recent_served),
+                    time_of(frame, since_start));
+}
+
 LiveResponse response_of(const Figures &figures, bool since_start) {
   if (since_start) return {figures.response_p50, figures.response_p99, figures.response_max};
   return {figures.recent_p50, figures.recent_p99, figures.recent_max};
@@ -130,6 +140,7 @@ Figures total_of(const Frame &frame) {
     total.recent_jobs += dag.figures.recent_jobs;
     total.recent_misses += dag.figures.recent_misses;
     total.recent_cpu += dag.figures.recent_cpu;
+    total.away += dag.figures.away;
   }
   return total;
 }

@@ -50,6 +50,10 @@ struct LiveRow {
 /// Processor time as a share of one processor.
 [[nodiscard]] double cpu_of(const live::page::Figures &figures, const live::Frame &frame, bool since_start);
 [[nodiscard]] double share_of(const live::ThreadFrame &thread, const live::Frame &frame, bool since_start);
+/// Time of the services of a device as a share of all its slots.
+[[nodiscard]] double share_of(const live::DeviceFrame &device, const live::Frame &frame, bool since_start);
+/// Services that ended, per second.
+[[nodiscard]] double rate_of(const live::DeviceFrame &device, const live::Frame &frame, bool since_start);
 
 struct LiveResponse {
   Duration p50 = 0;
@@ -58,7 +62,7 @@ struct LiveResponse {
 };
 [[nodiscard]] LiveResponse response_of(const live::page::Figures &figures, bool since_start);
 
-/// Returns finished jobs and misses, also the recent ones, of all DAGs.
+/// Returns finished jobs and misses, also the recent ones, and the jobs away, of all DAGs.
 [[nodiscard]] live::page::Figures total_of(const live::Frame &frame);
 
 /// Rates a response time: Bad above the deadline or the bound, Caution near the lesser of them. A limit of 0 means

@@ -32,6 +32,7 @@ Json figures_json(const live::page::Figures &f, const live::Frame &frame) {
             {"cpu_ns", f.recent_cpu},
             {"response", {{"p50_ns", f.recent_p50}, {"p99_ns", f.recent_p99}, {"max_ns", f.recent_max}}}}},
           {"active", f.active},
+          {"away", f.away},
           {"ready", f.ready},
           {"waiting", f.waiting}};
 }
@@ -47,6 +48,21 @@ Json classes_json(const std::uint32_t (&counts)[live::page::kClasses]) {
 
 Json histogram_json(const live::page::Spread &spread) {
   return {{"recent", classes_json(spread.recent)}, {"all", classes_json(spread.all)}};
+}
+
+Json device_json(const live::DeviceFrame &device, const live::Frame &frame) {
+  Json tasks = Json::array();
+  for (const std::uint32_t task : device.tasks) tasks.push_back(full_name(frame.tasks[task], frame));
+  return {{"name", device.name},
+          {"slots", device.slots},
+          {"used", device.used},
+          {"queued", device.queued},
+          {"tasks", std::move(tasks)},
+          {"busy", share_of(device, frame, false)},
+          {"rate", rate_of(device, frame, false)},
+          {"served", device.served},
+          {"busy_ns", device.busy},
+          {"recent", {{"served", device.recent_served}, {"busy_ns", device.recent_busy}}}};
 }
 
 Json task_json(const live::TaskFrame &task, const live::Frame &frame) {
@@ -81,6 +97,8 @@ Json to_json(const live::Listed &listed, const live::Page &page, Time now) {
                    {"left_out", frame.left_out},
                    {"threads", Json::array()},
                    {"threads_in_all", frame.threads_in_all},
+                   {"devices", Json::array()},
+                   {"devices_in_all", frame.devices_in_all},
                    {"alert", frame.alert.empty() ? Json(nullptr) : Json(frame.alert)},
                    {"dags", Json::array()},
                    {"tasks", Json::array()}};
@@ -91,6 +109,7 @@ Json to_json(const live::Listed &listed, const live::Page &page, Time now) {
          {"cpu_ns", thread.used},
          {"task", thread.task ? Json(full_name(frame.tasks[*thread.task], frame)) : Json(nullptr)}});
   }
+  for (const live::DeviceFrame &device : frame.devices) document["devices"].push_back(device_json(device, frame));
   for (const live::DagFrame &dag : frame.dags) {
     Json row = {{"name", dag.name}, {"max_active", dag.max_active},   {"deadline_ns", or_null(dag.deadline)},
                 {"late", dag.late}, {"recent_late", dag.recent_late}, {"histogram", histogram_json(dag.spread)}};

@@ -33,6 +33,7 @@ enum class Field : std::uint8_t {
   Bound,
   Missed,
   Active,
+  Away,
   Ready,
   Waiting,
   Preempted,
@@ -51,19 +52,20 @@ struct Column {
 // From left to right. The graphs at the end share what room is left.
 constexpr Column kColumns[] = {
     {Field::Name, "task", 99, LiveOrder::Name},
-    {Field::Rate, "rate/s", 10, LiveOrder::Rate},
-    {Field::P50, "p50", 6, std::nullopt},
-    {Field::P99, "p99", 13, LiveOrder::P99},
-    {Field::Longest, "max", 11, LiveOrder::Longest},
-    {Field::Deadline, "deadline", 9, std::nullopt},
-    {Field::Bound, "bound", 5, std::nullopt},
-    {Field::Missed, "missed", 12, LiveOrder::Misses},
-    {Field::Active, "active", 4, std::nullopt},
-    {Field::Ready, "ready", 3, std::nullopt},
+    {Field::Rate, "rate/s", 11, LiveOrder::Rate},
+    {Field::P50, "p50", 7, std::nullopt},
+    {Field::P99, "p99", 14, LiveOrder::P99},
+    {Field::Longest, "max", 12, LiveOrder::Longest},
+    {Field::Deadline, "deadline", 10, std::nullopt},
+    {Field::Bound, "bound", 6, std::nullopt},
+    {Field::Missed, "missed", 13, LiveOrder::Misses},
+    {Field::Active, "active", 5, std::nullopt},
+    {Field::Away, "away", 3, std::nullopt},
+    {Field::Ready, "ready", 4, std::nullopt},
     {Field::Waiting, "wait", 1, std::nullopt},
     {Field::Preempted, "preempted", 2, std::nullopt},
-    {Field::Cpu, "cpu", 8, LiveOrder::Cpu},
-    {Field::Histogram, "times", 7, std::nullopt},
+    {Field::Cpu, "cpu", 9, LiveOrder::Cpu},
+    {Field::Histogram, "times", 8, std::nullopt},
     {Field::Course, "p99 lately", 0, std::nullopt},
 };
 constexpr std::size_t kCount = std::size(kColumns);
@@ -118,6 +120,7 @@ Cell cell_of(Field field, const LiveRow &row, const Frame &frame, const LiveView
           shown.cap > 0 ? fmt::format("{}/{}", figures.active, shown.cap) : fmt::format("{}", figures.active);
       return {active, figures.active == 0 ? Tint::Faint : at_cap ? Tint::Caution : Tint::Plain};
     }
+    case Field::Away: return count_cell(figures.away);
     case Field::Ready: return count_cell(figures.ready, figures.ready > 0 && at_cap ? Tint::Caution : Tint::Plain);
     case Field::Waiting: return count_cell(figures.waiting);
     case Field::Preempted: return count_cell(view.since_start ? figures.preemptions : figures.recent_preemptions);

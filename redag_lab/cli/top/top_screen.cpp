@@ -10,6 +10,7 @@
 
 #include "redag/base/text.hpp"
 #include "redag_analysis/text/table.hpp"
+#include "redag_lab/cli/top/device_lines.hpp"
 #include "redag_lab/cli/top/live_figures.hpp"
 #include "redag_lab/cli/top/live_table.hpp"
 
@@ -40,11 +41,19 @@ constexpr std::array kHelp{
     "  missed           deadline misses since the start, +lately",
     "  bound            proven bound on the response time",
     "  active           jobs that have started and not ended, and max_active",
+    "  away             of these, jobs that wait without a worker: for a device,",
+    "                   an event, a time, or in a call that blocks",
     "  ready, wait      jobs that could start; that wait for predecessors",
     "  cpu              share of one processor, of jobs that ended",
     "  responses        how often each response time occurred, on one axis of",
     "                   time for all rows; red: beyond the deadline",
     "  p99 lately       the p99 at the last looks; full height: the deadline",
+    "",
+    "DEVICES",
+    "  busy             time of its services, as a share of its slots",
+    "  slots            used, and there are; queue: jobs that wait for one",
+    "  served/s         services that ended, per second",
+    "  serves           the tasks of the jobs that it serves now",
     "",
     "COLOURS",
     "  red     missed lately, or beyond the deadline or the bound",
@@ -75,6 +84,10 @@ std::vector<Line> head_of(const live::Listed &listed, const Frame &frame, Time n
                         total.recent_misses > 0 ? Tint::Bad
                         : total.misses > 0      ? Tint::Caution
                                                 : Tint::Good));
+  if (total.away > 0 || !frame.devices.empty()) {
+    lines.back().push_back(
+        {fmt::format("  {} job{} without a worker", total.away, total.away == 1 ? " waits" : "s wait")});
+  }
   if (!frame.alert.empty()) lines.push_back(words(frame.alert, Tint::Bad));
   if (const auto late = overdue(frame, now)) {
     lines.push_back(
@@ -217,6 +230,7 @@ class Drawing {
       add(words(fmt::format("the executor has ended; waiting for the next '{}'", frame.name), Tint::Bad));
     }
     for (Line &line : bars_of(frame, state_.view.since_start, columns_, lines_ / 6, glyphs_)) add(std::move(line));
+    for (Line &line : device_lines(frame, state_.view.since_start, columns_, lines_ / 6, glyphs_)) add(std::move(line));
     add(status(frame));
     LiveTable table = make_table(frame, state_.view, input_.course, columns_, glyphs_);
     drawing_.places.titles_line = drawing_.lines.size();
@@ -291,6 +305,10 @@ std::vector<Line> draw_once(const live::Listed &listed, const LiveView &view, Ti
   const Frame &frame = listed.page->frame;
   std::vector<Line> lines = head_of(listed, frame, now);
   for (Line &line : bars_of(frame, view.since_start, width > 0 ? width : kPipe, kMostBars, glyphs)) {
+    lines.push_back(std::move(line));
+  }
+  const std::size_t all_devices = frame.devices_in_all + 2;
+  for (Line &line : device_lines(frame, view.since_start, width > 0 ? width : kPipe, all_devices, glyphs)) {
     lines.push_back(std::move(line));
   }
   LiveTable table = make_table(frame, view, nullptr, width, glyphs);

@@ -16,6 +16,7 @@
 namespace redag::cli {
 namespace {
 
+using testing::accelerated_page;
 using ::testing::Contains;
 using ::testing::Each;
 using ::testing::HasSubstr;
@@ -100,6 +101,33 @@ TEST(TopScreen, AsItWasAt200x50) {
   expect_screen("200x50", shoot(state, &robot, 200, 50, &course).lines);
 }
 
+TEST(TopScreen, DevicesAt80x24) {
+  const live::Listed robot = accelerated_page();
+  const Course course = course_of(robot);
+  expect_screen("devices_80x24", shoot({}, &robot, 80, 24, &course).lines);
+}
+
+TEST(TopScreen, DevicesAt160x50) {
+  const live::Listed robot = accelerated_page();
+  const Course course = course_of(robot);
+  TopState state;
+  state.view.since_start = true;
+  expect_screen("devices_160x50", shoot(state, &robot, 160, 50, &course).lines);
+}
+
+TEST(TopScreen, OfTooManyDevicesSomeAreCounted) {
+  live::Listed robot = accelerated_page();
+  live::Frame &frame = robot.page->frame;
+  while (frame.devices.size() < live::page::kDevices) frame.devices.push_back({.name = "npu"});
+  frame.devices_in_all = 20;
+  const std::string text = joined(shoot({}, &robot, 80, 24).lines);
+  EXPECT_THAT(text, HasSubstr("\n18 more devices\n"));
+  EXPECT_THAT(text, HasSubstr("encoder"));
+  std::string once;
+  for (const Line &line : draw_once(robot, {}, frame.published, 80, kBlocks)) once += plain(line) + "\n";
+  EXPECT_THAT(once, HasSubstr("\n8 more devices\n"));
+}
+
 TEST(TopScreen, HelpAt80x24) {
   TopState state;
   state.mode = TopMode::Help;
@@ -142,7 +170,7 @@ TEST(TopScreen, NamesOfAllTasksAreWholeAt80x24) {
 }
 
 TEST(TopScreen, FitsEachSize) {
-  const live::Listed robot = robot_page();
+  const live::Listed robot = accelerated_page();
   const Course course = course_of(robot);
   for (const TopMode mode : {TopMode::Table, TopMode::Choose, TopMode::Help, TopMode::Filter, TopMode::Search}) {
     TopState state;
@@ -266,8 +294,8 @@ TEST(TopOnce, AllRowsAndColumnsWithoutALimit) {
   for (const Line &line : draw_once(robot, {}, robot.page->frame.published, 0, kAscii)) lines.push_back(plain(line));
   EXPECT_THAT(lines, Contains(HasSubstr("lidar_front")));
   EXPECT_THAT(lines, Contains(StartsWith("task")));
-  for (const char *column :
-       {"rate/s", "p50", "p99", "max", "deadline", "bound", "missed", "active", "ready", "wait", "preempted", "cpu"}) {
+  for (const char *column : {"rate/s", "p50", "p99", "max", "deadline", "bound", "missed", "active", "away", "ready",
+                             "wait", "preempted", "cpu"}) {
     EXPECT_THAT(lines, Contains(HasSubstr(column)));
   }
   EXPECT_THAT(lines, SizeIs(3 + 2 + 1 + 40));

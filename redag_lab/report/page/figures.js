@@ -170,23 +170,34 @@ function latenessFigure(groups, state) {
   });
 }
 
-/** Draws the whole run: the DAGs that kept the workers busy, and the missed deadlines. */
+const TIMELINE_HEIGHT = 268;
+const DEVICE_HEIGHT = 56;  // of a device's part of the timeline
+const MOST_DEVICES = 6;    // that the timeline shows; its data have all
+
+/** Draws the whole run: the DAGs that kept the workers busy, the devices in use, and the missed deadlines. */
 function timelineFigure(groups, state) {
-  return figure({
-    name: 'timeline', height: 268, label: 'Workers in use and missed deadlines over the whole run', zooms: true,
+  const fig = figure({
+    name: 'timeline', height: TIMELINE_HEIGHT, label: 'Workers in use and missed deadlines over the whole run', zooms: true,
     data() {
-      const {dags, timeline} = groups[state.executor];
+      const {dags, devices, timeline} = groups[state.executor];
       return {
-        columns: [column('from'), ...dags.flatMap(({name}) => [column(`${name}: workers`), column(`${name}: missed`)])],
-        rows: timeline.busy_ns[0].map((_, i) => ({cells: [timeCell(i * timeline.bin_ns), ...dags.flatMap((dag, d) => [
-          {text: (timeline.busy_ns[d][i] / timeline.bin_ns).toFixed(2), sort: timeline.busy_ns[d][i]}, shareCell(timeline.missed[d][i], timeline.released[d][i])])]})),
+        columns: [column('from'), ...devices.map(({name}) => column(`${name}: in use`, 'Share of its slots')),
+          ...dags.flatMap(({name}) => [column(`${name}: workers`), column(`${name}: missed`)])],
+        rows: timeline.busy_ns[0].map((_, i) => ({cells: [timeCell(i * timeline.bin_ns),
+          ...devices.map(({slots}, d) => ({text: formatPercent(timeline.device_busy_ns[d][i] / slots / timeline.bin_ns), sort: timeline.device_busy_ns[d][i]})),
+          ...dags.flatMap((dag, d) => [{text: (timeline.busy_ns[d][i] / timeline.bin_ns).toFixed(2), sort: timeline.busy_ns[d][i]}, shareCell(timeline.missed[d][i], timeline.released[d][i])])]})),
       };
     },
     caption: 'Above: workers in use, by DAG. Below: share of the jobs released in each interval that missed their deadline '
-      + 'or were lost.',
+      + 'or were lost. Between them, where there are devices: the share of their slots in use.',
     build(t, width) {
       const group = groups[state.executor];
       const line = group.timeline;
+      const devices = group.devices.slice(0, MOST_DEVICES);
+      const inUse = (d, i) => line.device_busy_ns[d][i] / devices[d].slots / line.bin_ns;
+      const last = 1 + devices.length;  // the grid of the misses
+      const down = devices.length * DEVICE_HEIGHT;
+      fig.resize(TIMELINE_HEIGHT + down);
       const bins = line.busy_ns[0].length;
       const time = (i) => i * line.bin_ns;
       const workers = group.run.config.workers;
@@ -195,23 +206,26 @@ function timelineFigure(groups, state) {
         axisLabel: {show: label, formatter: (value) => formatAxisTime(value, time(bins) / 10)},
       });
       return {
-        grid: [{left: 48, right: 16, top: 52, height: 100}, {left: 48, right: 16, top: 182, height: 58}],
+        grid: [{left: 48, right: 16, top: 52, height: 100}, ...devices.map((_, d) => ({left: 48, right: 16, top: 178 + d * DEVICE_HEIGHT, height: DEVICE_HEIGHT - 24})),
+          {left: 48, right: 16, top: 182 + down, height: 58}],
         legend: {data: group.dags.map((dag) => dag.name)},
-        dataZoom: [{type: 'inside', xAxisIndex: [0, 1], filterMode: 'none', zoomOnMouseWheel: 'ctrl', preventDefaultMouseMove: false}],
+        dataZoom: [{type: 'inside', xAxisIndex: Array.from({length: last + 1}, (_, i) => i), filterMode: 'none', zoomOnMouseWheel: 'ctrl', preventDefaultMouseMove: false}],
         tooltip: {
           trigger: 'axis', axisPointer: {type: 'line', link: [{xAxisIndex: 'all'}]},
           formatter: (items) => {
             const i = items[0].dataIndex;
-            return tip([`${formatTime(time(i))} to ${formatTime(time(i + 1))}`, ...group.dags.map((dag, d) =>
+            return tip([`${formatTime(time(i))} to ${formatTime(time(i + 1))}`, ...devices.map(({name}, d) => `${name}: ${formatPercent(inUse(d, i))} in use`), ...group.dags.map((dag, d) =>
               `${dag.name}: ${(line.busy_ns[d][i] / line.bin_ns).toFixed(2)} workers, ${line.missed[d][i]} of ${line.released[d][i]} missed`)]);
           },
         },
         axisPointer: {link: [{xAxisIndex: 'all'}]},
-        xAxis: [axis(0, false), axis(1, true)],
+        xAxis: Array.from({length: last + 1}, (_, i) => axis(i, i === last)),
         yAxis: [
           {type: 'value', gridIndex: 0, min: 0, max: workers, interval: Math.max(1, Math.ceil(workers / 4)), name: 'workers',
             nameTextStyle: {align: 'left'}, nameGap: 8},
-          {type: 'value', gridIndex: 1, min: 0, max: 1, interval: 1, name: 'missed', nameGap: 4, nameTextStyle: {align: 'left'},
+          ...devices.map(({name}, d) => ({type: 'value', gridIndex: 1 + d, min: 0, max: 1, interval: 1, name, nameGap: 4, nameTextStyle: {align: 'left'},
+            axisLabel: {formatter: (value) => `${100 * value} %`}})),
+          {type: 'value', gridIndex: last, min: 0, max: 1, interval: 1, name: 'missed', nameGap: 4, nameTextStyle: {align: 'left'},
             axisLabel: {formatter: (value) => `${100 * value} %`}},
         ],
         series: [
@@ -220,8 +234,13 @@ function timelineFigure(groups, state) {
             lineStyle: {width: 0}, areaStyle: {opacity: 0.85}, itemStyle: {color: hueOf(t, d).color},
             data: [...line.busy_ns[d], line.busy_ns[d][bins - 1]].map((busy, i) => [time(i), busy / line.bin_ns]),
           })),
+          ...devices.map(({name}, d) => ({
+            type: 'line', name, xAxisIndex: 1 + d, yAxisIndex: 1 + d, step: 'end', showSymbol: false,
+            lineStyle: {width: 1}, areaStyle: {opacity: 0.4}, itemStyle: {color: t.soft},
+            data: Array.from({length: bins + 1}, (_, i) => [time(i), inUse(d, Math.min(i, bins - 1))]),
+          })),
           ...group.dags.map((dag, d) => ({
-            type: 'line', name: dag.name, xAxisIndex: 1, yAxisIndex: 1, step: 'end', showSymbol: false,
+            type: 'line', name: dag.name, xAxisIndex: last, yAxisIndex: last, step: 'end', showSymbol: false,
             lineStyle: {width: 1.5}, areaStyle: {opacity: 0.2}, itemStyle: {color: hueOf(t, d).color},
             data: [...line.missed[d], line.missed[d][bins - 1]].map((missed, i) => [time(i), missed / Math.max(1, line.released[d][i] || 0)]),
           })),
@@ -229,6 +248,7 @@ function timelineFigure(groups, state) {
       };
     },
   });
+  return fig;
 }
 
 /** Returns the next number of one or two digits, for the end of an axis. */

@@ -80,6 +80,15 @@ const ENDS = {
   open: 'continues',
   waits: 'waits from here',
 };
+const STAYS = {
+  not_ready: 'not ready',
+  ready: 'ready',
+  on_worker: 'on a worker',
+  preempted: 'preempted',
+  device_queue: 'queue of a device',
+  device: 'at a device',
+  waits: 'other waits',
+};
 const TONES = {
   good: '\u2713',
   bad: '\u2717',

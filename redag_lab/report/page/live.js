@@ -18,6 +18,7 @@ const alarm = element('p.bad-text', {role: 'alert'});
 const picker = element('select', {'aria-label': 'executor', onchange: () => choose(picker.value)});
 const pick = element('label', {}, 'executor', picker);
 const bars = workerBars();
+const devices = deviceTable();
 const course = courseFigure();
 const rows = liveTable(view, () => show());
 const content = element('div');
@@ -69,6 +70,7 @@ function show() {
   setText(alarm, [frame.alert, problem.startsWith('no update') ? 'The process is stopped, or gets no processor.' : null,
     frame.left_out > 0 ? `${formatCount(frame.left_out)} more tasks do not fit the live page.` : null].filter(Boolean).join(' '));
   bars.update(frame);
+  devices.update(frame);
   rows.update(frame);
 }
 
@@ -106,7 +108,7 @@ function choose(executor) {
 }
 
 const filter = element('input', {type: 'search', placeholder: 'filter names', 'aria-label': 'filter names', oninput: () => { view.filter = filter.value; if (live.frame) show(); }});
-content.append(misses, alarm, bars.node, element('h2', {id: 'table'}, 'DAGs and tasks'),
+content.append(misses, alarm, bars.node, devices.node, element('h2', {id: 'table'}, 'DAGs and tasks'),
   element('div.row.controls', {}, filter, toggle('since the start', 'Response times of the whole run, instead of the last seconds', 'whole'), toggle('only DAGs', 'Without their tasks', 'dagsOnly')),
   rows.node, element('h2', {id: 'course'}, 'Response times lately'), course.box);
 content.hidden = true;

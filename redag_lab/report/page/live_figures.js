@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What the page of `redag serve` shows of a frame: bars of workers, histograms, the course of the response times, and
-// the table of DAGs and tasks. Elements are kept from frame to frame, so that focus and scrolling stay.
+// What the page of `redag serve` shows of a frame: bars of workers, devices, histograms, the course of the response
+// times, and the table of DAGs and tasks. Elements are kept from frame to frame, so that focus and scrolling stay.
 
 const NEAR = 0.9;        // share of a limit that counts as near, as in redag top
 const MOST_ROWS = 500;   // a browser is slow with more
@@ -56,6 +56,48 @@ function workerBars() {
   };
 }
 
+/** Returns the table of the devices as {node, update(frame)}; hidden without devices. */
+function deviceTable() {
+  const titles = [['slots', 'slots in use, and there are'], ['queue', 'jobs that wait for a slot'],
+    ['served/s', 'services that ended, per second', 'minor'], ['serves', 'the tasks of the jobs that it serves now', 'text']];
+  const body = element('tbody');
+  const note = element('p.soft');
+  const node = element('div', {hidden: ''}, element('h2', {id: 'devices'}, 'Devices'), element('div.table.device-table', {tabindex: '0'},
+    element('table', {}, element('caption.sr-only', {}, 'Devices'), element('thead', {}, element('tr', {}, element('th', {scope: 'col'}, 'device'),
+      element('th.text', {scope: 'col', title: 'time of its services, as a share of its slots'}, 'busy'),
+      ...titles.map(([text, help, kind = '']) => element('th', {scope: 'col', title: help, class: kind}, text)))), body)), note);
+  const rows = [];
+  const make = () => {
+    const fill = element('div');
+    const parts = {head: element('th', {scope: 'row'}), bar: element('div.bar', {}, fill), fill, share: element('span.share'),
+      cells: titles.map(([text, , kind = '']) => element('td', {class: kind, 'data-label': text}))};
+    return {...parts, node: element('tr', {}, parts.head, element('td.text', {'data-label': 'busy'}, element('div.busy-bar', {}, parts.bar, parts.share)), ...parts.cells)};
+  };
+  return {
+    node,
+    update({devices, devices_in_all: all}) {
+      node.hidden = devices.length === 0;
+      while (rows.length < devices.length) {
+        rows.push(make());
+        body.append(rows.at(-1).node);
+      }
+      while (rows.length > devices.length) rows.pop().node.remove();
+      devices.forEach((device, i) => {
+        const row = rows[i];
+        setText(row.head, device.name);
+        row.fill.style.width = `${(100 * Math.min(1, device.busy)).toFixed(1)}%`;
+        setClass(row.bar, device.busy >= 0.9 ? 'bar full' : device.busy >= 0.7 ? 'bar busy' : 'bar');
+        setText(row.share, formatPercent(device.busy));
+        const more = device.used > device.tasks.length ? [`${device.used - device.tasks.length} more`] : [];
+        const texts = [`${device.used}/${device.slots}`, formatCount(device.queued), device.rate > 0 ? String(Number(device.rate.toPrecision(4))) : '\u2013',
+          [...device.tasks, ...more].join(', ')];
+        texts.forEach((text, cell) => setText(row.cells[cell], text));
+      });
+      setText(note, all > devices.length ? `${formatCount(all - devices.length)} more devices find no room in the live page.` : '');
+    },
+  };
+}
+
 /** Returns the range of the classes of time of all rows: {low, high}, in ns; null without a response time. */
 function timeRange(rows) {
   const least = rows.flatMap((row) => row.histogram.all.map(([ns]) => ns));
@@ -97,6 +139,7 @@ const LIVE_COLUMNS = [
   {major: true, title: 'missed', help: 'deadline misses since the start', cell: missedCell, key: (row) => row.recent.misses * 1e9 + row.misses},
   {title: 'lately', help: 'deadline misses in the last seconds', cell: (row) => ({text: formatCount(row.recent.misses), tone: row.recent.misses > 0 ? 'bad-text' : ''}), key: (row) => row.recent.misses},
   {title: 'active', help: 'jobs that have started and not ended, and the bound on them', cell: (row) => ({text: row.max_active > 0 ? `${row.active}/${row.max_active}` : String(row.active), tone: row.max_active > 0 && row.active >= row.max_active ? 'near-text' : ''})},
+  {title: 'away', help: 'active jobs that wait without a worker: for a device, an event, a time, or in a call that blocks', cell: count('away'), key: (row) => row.away},
   {title: 'ready', help: 'released jobs that could start', cell: count('ready'), key: (row) => row.ready},
   {title: 'wait', help: 'released jobs that wait for predecessors', cell: count('waiting'), key: (row) => row.waiting},
   {title: 'cpu', help: 'share of one processor, of the jobs that ended', cell: (row) => ({text: formatPercent(row.cpu)}), key: (row) => row.cpu},
@@ -134,10 +177,10 @@ function liveTable(view, changed) {
   const note = element('p.soft');
   const kept = new Map();
   const make = (row) => {
-    const cells = LIVE_COLUMNS.map(() => element('td'));
+    const cells = LIVE_COLUMNS.map(({title}) => element('td', {'data-label': title}));
     const svg = svgElement('svg', {class: 'spread', viewBox: '0 0 132 22', preserveAspectRatio: 'none', role: 'img'});
     const head = element('th', {scope: 'row'});
-    return {node: element(`tr.${row.kind}`, {}, head, ...cells, element('td.text', {}, svg)), head, cells, svg};
+    return {node: element(`tr.${row.kind}`, {}, head, ...cells, element('td.text', {'data-label': 'times'}, svg)), head, cells, svg};
   };
   return {
     node: element('div', {}, element('div.table.live-table', {tabindex: '0'}, table), note),

@@ -5,7 +5,7 @@
 
 const report = JSON.parse(document.getElementById('data').textContent);
 const {groups} = report;
-const state = {executor: 0, task: null, tail: false, log: false, view: 0, rows: 'tasks', why: null};
+const state = {executor: 0, task: null, tail: false, log: false, view: 0, rows: 'tasks', why: null, longest: false};
 const several = groups.length > 1;
 
 /** Returns the sentences of a verdict, without what its headline says. */
@@ -101,6 +101,10 @@ function detailSections() {
         : `Bounds for ${bounds.assumes}. The tooltip of a bound names its method.`}${order}`);
     }),
     filled(() => taskTable(groups[state.executor])),
+    heading(3, 'parts', 'Where response times go'),
+    element('div.row.controls', {}, choice('Jobs', ['all jobs, mean', 'longest response'], 0, (i) => { state.longest = i === 1; refill(); })),
+    element('p.soft', {}, 'From the release to the finish. The parts sum to the response time. Orange: time that other jobs cost it.'),
+    filled(() => splitTable(groups[state.executor], state.longest)),
     heading(2, 'responses', 'Response times'),
     element('div.row.controls', {}, taskChoice(redraw),
       choice('Curve', ['distribution', 'tail'], 0, (i) => { state.tail = i === 1; responses.draw(); }),
@@ -112,7 +116,7 @@ function detailSections() {
     heading(3, 'detail', 'Schedule in detail'),
     element('div.row.controls', {},
       filled(() => dropdown('show', viewNames(groups[state.executor]), state.view, (i) => { state.view = i; schedule.look(); })),
-      choice('Rows', ['tasks', 'workers'], 0, (i) => { state.rows = i === 1 ? 'workers' : 'tasks'; schedule.draw(); })),
+      choice('Rows', ['tasks', groups.some(({devices}) => devices.length > 0) ? 'workers and devices' : 'workers'], 0, (i) => { state.rows = i === 1 ? 'workers' : 'tasks'; schedule.draw(); })),
     filled(() => element('p.keys.soft', {}, ...groups[state.executor].dags.slice(0, 24).map((dag, d) => element('span', {}, swatch(hueOf(theme(), d)), dag.name)))),
     schedule.box,
   ];

@@ -1,12 +1,14 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Draws the schedule: which job ran where and when. Rows are tasks (with releases, deadlines and misses) or workers.
+// Draws the schedule: which job ran where and when. Rows are tasks (with releases, deadlines and misses), or workers
+// and the slots of devices.
 
 const [OPEN, PREEMPTED, WAITS] = [valueOf(ENDS, 'open'), valueOf(ENDS, 'preempted'), valueOf(ENDS, 'waits')];
 const [FINISHED, SKIPPED] = [valueOf(OUTCOMES, 'finished'), valueOf(OUTCOMES, 'skipped')];
 const ROW_HEIGHT = 30;
 const MOST_ROWS = 64;
+const HATCH = 'rgba(255,255,255,.45)';  // a job at a device
 const ROOM_FOR_ARROWS = 9;  // pixels from release to deadline; with fewer, only misses are marked
 
 /** `explain(task, number, missed)` is called for a job that the reader clicks on. */
@@ -18,12 +20,12 @@ function scheduleFigure(groups, state, explain) {
     const group = groups[state.executor];
     const view = group.schedule.views[state.view] || group.schedule.views[0];
     const seen = group.schedule.windows[view.window];
-    const {jobs, slices} = seen;
+    const {jobs, slices, services} = seen;
     const start = group.run.start_ns;
     const from = seen.begin_ns - start;
     const used = state.rows === 'workers' ? [] : tasksOf(jobs, slices, view.task);
     const rows = state.rows === 'workers'
-      ? Array.from({length: Math.min(group.run.config.workers, MOST_ROWS)}, (_, w) => workerName(group, w))
+      ? [...Array.from({length: group.run.config.workers}, (_, w) => workerName(group, w)), ...slotsOf(group, services).map(({name}) => name)].slice(0, MOST_ROWS)
       : used.map((task) => taskName(group, task));
     const rowOf = new Map(used.map((task, i) => [task, i]));
     const row = (task, worker) => (state.rows === 'workers' ? worker : rowOf.get(task));
@@ -32,6 +34,10 @@ function scheduleFigure(groups, state, explain) {
       row(task, slices.worker[i]), from + slices.begin[i], from + slices.begin[i] + slices.length[i], i]).filter(shown);
     const marks = state.rows === 'workers' ? [] : jobs.task.map((task, i) => [
       rowOf.get(task), from + jobs.release[i], from + jobs.release[i] + jobs.deadline[i], i]).filter(shown);
+    const slotRow = new Map(slotsOf(group, services).map(({device, slot}, i) => [`${device}/${slot}`, group.run.config.workers + i]));
+    const served = services.task.map((task, i) => [
+      state.rows === 'workers' ? slotRow.get(`${services.device[i]}/${services.slot[i]}`) : rowOf.get(task),
+      from + services.begin[i], from + services.begin[i] + services.length[i], i]).filter(shown);
     // A wait lasts until the job's next slice.
     const next = new Map();
     const resumed = new Array(slices.task.length).fill(null);
@@ -40,7 +46,15 @@ function scheduleFigure(groups, state, explain) {
       if (slices.how[i] === WAITS) resumed[i] = next.has(job) ? next.get(job) : seen.end_ns - start;
       next.set(job, from + slices.begin[i]);
     }
-    return {group, view, jobs, slices, rows, bars, marks, resumed, from, to: seen.end_ns - start, start};
+    return {group, view, jobs, slices, services, rows, bars, marks, served, resumed, from, to: seen.end_ns - start, start};
+  }
+
+  /** Returns the slots of devices with a row: the first of each device, and the others as far as they are used. */
+  function slotsOf(group, services) {
+    return group.devices.flatMap(({name, slots}, device) => {
+      const last = Math.max(0, ...services.slot.filter((_, i) => services.device[i] === device));
+      return Array.from({length: last + 1}, (_, slot) => ({device, slot, name: slots > 1 ? `${name}, slot ${slot + 1}` : name}));
+    });
   }
 
   // Workers are numbered through all clusters.
@@ -88,7 +102,7 @@ function scheduleFigure(groups, state, explain) {
       };
     },
     caption: 'Drag to move; zoom with Ctrl and the wheel, or with two fingers. Colour: DAG; \u2191 release; \u2193 deadline; red: missed deadline; '
-      + `\u00d7 lost job. A slice that ends with a notch was preempted. A click explains a job. At most ${MOST_ROWS} rows are shown, those with misses first.`,
+      + `\u00d7 lost job. A slice that ends with a notch was preempted. A thin line is a wait without a worker, a hatched part of it the time at a device. A click explains a job. At most ${MOST_ROWS} rows are shown, those with misses first.`,
     build(t) {
       const c = contents();
       const inTasks = state.rows === 'tasks';
@@ -103,6 +117,11 @@ function scheduleFigure(groups, state, explain) {
           formatter: (item) => {
             const i = item.value[3];
             if (item.seriesName === 'jobs') return tip(describeJob(c, i));
+            if (item.seriesName === 'devices') {
+              const at = c.services.job[i];
+              return tip([...(at === null ? [taskName(c.group, c.services.task[i])] : describeJob(c, at)),
+                `${c.group.devices[c.services.device[i]].name}: ${formatTime(c.services.length[i])} from ${formatTime(item.value[1])}`]);
+            }
             const j = c.slices.job[i];
             const job = j === null ? [taskName(c.group, c.slices.task[i])] : describeJob(c, j);
             return tip([...job, `${workerName(c.group, c.slices.worker[i])}: ${formatTime(c.slices.length[i])} from ${formatTime(item.value[1])}`,
@@ -185,13 +204,35 @@ function scheduleFigure(groups, state, explain) {
               return {type: 'group', children};
             },
           },
+          {
+            // A job at a device: in a task's row on the thin line of its wait.
+            type: 'custom', name: 'devices', data: c.served, encode: {x: [1, 2], y: 0}, z: 2, progressive: 0,
+            renderItem: (params, api) => {
+              const i = api.value(3);
+              const [x0, y] = api.coord([api.value(1), api.value(0)]);
+              const [x1] = api.coord([api.value(2), api.value(0)]);
+              const height = ROW_HEIGHT * (inTasks ? 0.3 : 0.74);
+              const box = clip(params, {x: x0, y: y - height / 2, width: Math.max(1, x1 - x0), height});
+              if (!box) return null;
+              const colour = hueOf(t, c.group.tasks[c.services.task[i]].dag).color;
+              const children = [{type: 'rect', shape: {...box, r: box.width > 4 ? 2 : 0}, style: {fill: colour, opacity: 0.92}}];
+              for (let x = box.x + 3; inTasks && x + 4 < box.x + box.width; x += 6) {
+                children.push({type: 'line', silent: true, shape: {x1: x, x2: x + 4, y1: box.y + box.height, y2: box.y}, style: {stroke: HATCH, lineWidth: 1.5}});
+              }
+              if (!inTasks && box.width > 34) {
+                children.push({type: 'text', silent: true, style: {text: c.group.tasks[c.services.task[i]].name, x: box.x + 4, y, fontSize: 11,
+                  width: box.width - 8, overflow: 'truncate', ellipsis: '', textVerticalAlign: 'middle', fill: t.paper}});
+              }
+              return {type: 'group', children};
+            },
+          },
         ],
       };
     },
     onready(chart) {
       chart.on('click', ({value, seriesName}) => {
-        const {jobs, slices} = contents();
-        const j = seriesName === 'jobs' ? value[3] : slices.job[value[3]];
+        const {jobs, slices, services} = contents();
+        const j = seriesName === 'jobs' ? value[3] : (seriesName === 'devices' ? services : slices).job[value[3]];
         if (j !== null && j !== undefined) explain(jobs.task[j], jobs.number[j], jobs.missed[j] === 1);
       });
       chart.on('datazoom', () => {

@@ -70,6 +70,53 @@ function taskTable(group) {
   return table('Tasks', columns, rows);
 }
 
+const STAY_HELP = {
+  not_ready: 'Its release was not seen yet, or a predecessor was incomplete',
+  ready: 'Could start or go on, but for a worker; before it has started also for max_active, its group, or an earlier job of its task',
+  on_worker: 'Had a worker',
+  preempted: 'Lost its worker to another job',
+  device_queue: 'Had asked a device, which served others',
+  device: 'Was served by a device',
+  waits: 'Waited without a worker for something else: an event, a time, or in a call that blocks',
+};
+
+/** Returns a bar of the parts of a response, by stay. Work has the hue of the DAG; orange is time that others cost it. */
+function splitBar(t, lengths, colour) {
+  const looks = {not_ready: [t.line, 1], ready: [t.delay, 1], on_worker: [colour, 1], preempted: [t.delay, 0.7], device_queue: [t.delay, 0.45],
+    device: [colour, 0.55], waits: [t.soft, 0.5]};
+  const sum = Math.max(1, lengths.reduce((a, b) => a + b, 0));
+  let at = 0;
+  const parts = Object.keys(STAYS).map((stay, i) => {
+    const x = 100 * at / sum;
+    at += lengths[i];
+    const [fill, opacity] = looks[stay];
+    return svgElement('rect', {x: x.toFixed(3), y: 2, width: (100 * lengths[i] / sum).toFixed(3), height: 12, fill, opacity},
+      svgElement('title', {}, `${STAYS[stay]}: ${formatPercent(lengths[i] / sum)}`));
+  });
+  return svgElement('svg', {class: 'meter split', viewBox: '0 0 100 16', preserveAspectRatio: 'none', role: 'img', 'aria-label': 'The parts beside it as shares'}, ...parts);
+}
+
+/** Returns where the response times of each task go: of all its jobs, or of the one with the longest response. */
+function splitTable(group, longest) {
+  const t = theme();
+  const tasks = group.tasks.filter((task) => task.jobs !== undefined && task.jobs.response);
+  const lengthsOf = ({jobs}) => (longest ? jobs.split.longest_ns : jobs.split.total_ns.map((ns) => ns / jobs.response.count));
+  const stays = Object.keys(STAYS).map((stay, i) => ({stay, i})).filter(({i}) => tasks.some(({jobs}) => jobs.split.total_ns[i] > 0));
+  const columns = [column('task'), column(longest ? 'longest response' : 'mean response'), column('parts', 'The columns behind it, as shares', true),
+    ...stays.map(({stay}) => column(STAYS[stay], STAY_HELP[stay]))];
+  const delays = ['ready', 'preempted', 'device_queue'];
+  let dag = -1;
+  return table('Parts of response times', columns, tasks.map((task) => {
+    const first = task.dag !== dag;
+    dag = task.dag;
+    const look = hueOf(t, task.dag);
+    const lengths = lengthsOf(task);
+    const sum = lengths.reduce((a, b) => a + b, 0);
+    return {first, cells: [{text: named(look, `${group.dags[task.dag].name}.${task.name}`)}, timeCell(sum), {text: splitBar(t, lengths, look.color), sort: sum},
+      ...stays.map(({stay, i}) => timeCell(lengths[i], {kind: lengths[i] > 0 && delays.includes(stay) ? 'delay' : '', title: formatPercent(lengths[i] / Math.max(1, sum))}))]};
+  }));
+}
+
 /** Returns the responses of each sink of a DAG with several sinks. */
 function sinkTimes(group, dag) {
   const {sinks} = dag.end_to_end;
