@@ -206,7 +206,8 @@ scrape_configs:
                 query = one["expr"].replace("$executor", ".*").replace("$dag", ".*")
                 query = query.replace("$__rate_interval", "30s").replace("$__range", "30s")
                 result = self.eventually(panel["title"], lambda query=query: ask(f"count({query}) > 0") or
-                                         "end_to_end_deadline" in query or "bound" in query and ask(f"count({query})"))
+                                         "end_to_end_deadline" in query or "redag_device" in query or
+                                         "bound" in query and ask(f"count({query})"))
                 self.assertTrue(result)
         (p99,) = ask('histogram_quantile(0.99, sum by (le) (rate(redag_response_seconds_bucket{task="plan"}[30s])))')
         self.assertGreater(float(p99["value"][1]), 0.020)
