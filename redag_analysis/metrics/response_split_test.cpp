@@ -15,13 +15,12 @@ namespace {
 using testing::make_dag;
 using testing::make_workload;
 using testing::TraceBuilder;
-constexpr Duration kMs = kMillisecond;
 
 ResponseSplit in_ms(Duration not_ready, Duration ready, Duration on_worker, Duration preempted, Duration device_queue,
                     Duration device, Duration waits) {
   ResponseSplit split;
   split.length = {not_ready, ready, on_worker, preempted, device_queue, device, waits};
-  for (Duration &length : split.length) length *= kMs;
+  for (Duration &length : split.length) length *= kMillisecond;
   return split;
 }
 
@@ -76,7 +75,7 @@ TEST(ResponseSplits, KeepTheLongestOneAndTheSum) {
   first.add(second);
   EXPECT_EQ(first.jobs, 4U);
   EXPECT_EQ(first.longest, in_ms(0, 0, 2, 9, 0, 0, 0));
-  EXPECT_EQ(first.total.sum(), (3 + 8 + 6 + 11) * kMs);
+  EXPECT_EQ(first.total.sum(), (3 + 8 + 6 + 11) * kMillisecond);
 }
 
 }  // namespace
