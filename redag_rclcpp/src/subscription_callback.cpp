@@ -56,6 +56,13 @@ class Loan {
   void *message_ = nullptr;
 };
 
+/// True if a buffer of messages of this process has one: taking from an empty one is not allowed. It looks at no wait
+/// set.
+bool has_message(rclcpp::Waitable &buffer) {
+  static rcl_wait_set_t none = rcl_get_zero_initialized_wait_set();
+  return compat::is_ready(buffer, none);
+}
+
 std::size_t depth_of(const rclcpp::QoS &qos) {
   return qos.history() == rclcpp::HistoryPolicy::KeepLast ? qos.depth() : 0;
 }
@@ -157,9 +164,7 @@ void SubscriptionCallback::unhook() {
 
 bool SubscriptionCallback::handle_intra_process(const Token &token) {
   const auto waitable = intra_process_.lock();
-  // Taking from an empty buffer is not allowed.
-  rcl_wait_set_t unused = rcl_get_zero_initialized_wait_set();
-  if (!waitable || !compat::is_ready(*waitable, unused)) return false;
+  if (!waitable || !has_message(*waitable)) return false;
   std::shared_ptr<void> data = waitable->take_data_by_entity_id(static_cast<std::size_t>(token.part));
   compat::execute(*waitable, data);
   return true;
@@ -212,10 +217,8 @@ void SubscriptionCallback::drop_skipped(Source source) {
   if (!subscription) return;
   if (source == Source::IntraProcess) {
     const auto intra_process = intra_process_.lock();
-    rcl_wait_set_t unused = rcl_get_zero_initialized_wait_set();
-    return drop_messages(source, [&] {
-      return intra_process && compat::is_ready(*intra_process, unused) && intra_process->take_data() != nullptr;
-    });
+    return drop_messages(
+        source, [&] { return intra_process && has_message(*intra_process) && intra_process->take_data() != nullptr; });
   }
   const auto drop = [&](auto take) {
     const auto dropped = [] {};
