@@ -12,6 +12,7 @@
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "redag/runtime/async_event.hpp"
@@ -40,7 +41,7 @@ class CoroutineEnds : public ::testing::TestWithParam<PreemptionMode> {
     options.band = band_;
     options.on_exception = [this](const Job &, std::exception_ptr exception) {
       try {
-        std::rethrow_exception(exception);
+        std::rethrow_exception(std::move(exception));
       } catch (const std::exception &error) {
         thrown_ = error.what();
       }

@@ -201,7 +201,7 @@ TEST_P(EveryMode, AJobThatHasUsedItsBudgetIsCutOffWhereItWouldWait) {
   DagBuilder dag("dag");
   dag.timer("task", 20ms,
             [&]() -> Coroutine {
-              const auto local = alive;
+              const std::shared_ptr<void> local(alive);
               use(2ms);
               co_await sleep_for(1ms);
               use(4ms);  // more than the budget only together with what it used before

@@ -192,13 +192,13 @@ TEST_P(DeviceInEveryMode, TheStopEndsWaits) {
     Executor executor(options);
     const DeviceHandle gpu = executor.device("gpu");
     dags.push_back(executor.add(once("sleeps", [&]() -> Coroutine {
-      const auto local = alive;
+      const std::shared_ptr<void> local(alive);
       ++waiting;
       co_await sleep_for(1h);
       ADD_FAILURE() << "the sleep was not over";
     })));
     dags.push_back(executor.add(once("waits", [&]() -> Coroutine {
-      const auto local = alive;
+      const std::shared_ptr<void> local(alive);
       ++waiting;
       try {
         co_await never;
@@ -209,7 +209,7 @@ TEST_P(DeviceInEveryMode, TheStopEndsWaits) {
       ADD_FAILURE() << "the event was not set";
     })));
     dags.push_back(executor.add(once("is_served", [&]() -> Coroutine {
-      const auto local = alive;
+      const std::shared_ptr<void> local(alive);
       ++waiting;
       co_await gpu.run([&] {
         serving = true;
@@ -218,7 +218,7 @@ TEST_P(DeviceInEveryMode, TheStopEndsWaits) {
       served = true;  // a service is never cut off
     })));
     dags.push_back(executor.add(once("queues", [&]() -> Coroutine {
-      const auto local = alive;
+      const std::shared_ptr<void> local(alive);
       ++waiting;
       while (!serving) co_await sleep_for(100us);
       queued = true;
