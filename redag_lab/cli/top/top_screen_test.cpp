@@ -20,7 +20,6 @@ using testing::accelerated_page;
 using ::testing::Contains;
 using ::testing::Each;
 using ::testing::HasSubstr;
-using ::testing::Le;
 using ::testing::Not;
 using testing::robot_page;
 using ::testing::SizeIs;
