@@ -22,6 +22,7 @@ namespace {
 // By task of a DAG: whether it was made by event().
 std::vector<bool> events_among(const std::vector<std::shared_ptr<EventSource>> &sources) {
   std::vector<bool> is_event;
+  is_event.reserve(sources.size());
   for (const auto &source : sources) is_event.push_back(source != nullptr);
   return is_event;
 }

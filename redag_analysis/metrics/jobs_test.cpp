@@ -152,7 +152,8 @@ TEST(JobsCsv, AJobInProgressHoldsUpOnlySoMany) {
   TraceBuilder t(w);
   t.at(0).arrives("lo", 0).dispatched("lo", 0, 0, 1000);
   for (std::uint32_t job = 0; job < 6; ++job) {
-    t.at(10 * job).arrives("hi", job).dispatched("hi", job, 1, 10 * job + 10).at(10 * job + 1).finished("hi", job, 1);
+    const Time begin = Time{10} * job;
+    t.at(begin).arrives("hi", job).dispatched("hi", job, 1, begin + 10).at(begin + 1).finished("hi", job, 1);
   }
   const trace::Trace trace = t.at(70).finished("lo", 0, 0).arrives("hi", 6).until(80);
   using Sequences = std::vector<std::uint64_t>;

@@ -18,7 +18,6 @@ namespace {
 
 using testing::accelerated_page;
 using ::testing::Contains;
-using ::testing::Each;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using testing::robot_page;
