@@ -69,9 +69,9 @@ class Exporter(Case):
             time.sleep(0.1)
         return self.fail(what)
 
-    def executor(self):
-        process = self.start(PROGRAM, "run", self.cart, "--duration", "1h", "--json", stdout=subprocess.DEVNULL,
-                             stderr=subprocess.DEVNULL)
+    def executor(self, workload=None):
+        process = self.start(PROGRAM, "run", workload or self.cart, "--duration", "1h", "--json",
+                             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         page = pathlib.Path(f"/dev/shm/redag.{process.pid}.0")
         self.eventually("no page", page.exists)
         os.link(page, self.pages / page.name)
@@ -156,13 +156,14 @@ class Exporter(Case):
 
     def test_the_dashboard_asks_for_metrics_that_exist(self):
         self.executor()
+        self.executor(SOURCE / "workloads" / "perception.yaml")  # has a device
         names = set(re.findall(r"\bredag_\w+", self.once()))
         dashboard = json.loads(DASHBOARD.read_text())
         for panel in dashboard["panels"]:
             for target in panel["targets"]:
                 for name in re.findall(r"\bredag_\w+", target["expr"]):
-                    # The cart has no end-to-end deadline, and no devices.
-                    if name != "redag_end_to_end_deadline_seconds" and not name.startswith("redag_device_"):
+                    # Neither has an end-to-end deadline.
+                    if name != "redag_end_to_end_deadline_seconds":
                         self.assertIn(name, names, panel["title"])
 
     @unittest.skipUnless(HAS_PROMETHEUS, "no Prometheus")
