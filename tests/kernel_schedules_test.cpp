@@ -151,7 +151,7 @@ Workload random_workload(Rng &rng, std::uint32_t workers) {
     workload.name = "kernel";
     workload.platform = Platform{workers, PreemptionMode::Os};
     workload.policy = rng.uniform01() < 0.7 ? PolicyKind::RateMonotonic : PolicyKind::Fixed;
-    const auto dags = static_cast<std::size_t>(rng.uniform(2, 4));
+    const auto dags = static_cast<std::size_t>(rng.uniform(2, std::max(4U, workers)));
     const double load = (0.6 + 0.8 * rng.uniform01()) * workers / static_cast<double>(dags);
     for (std::size_t d = 0; d < dags; ++d) workload.dags.push_back(random_dag(rng, d, load));
     const Diagnostics findings = validate(workload);
@@ -183,7 +183,7 @@ class KernelSchedules : public ::testing::Test {
     return cpus;
   }
   static std::uint32_t random_workers(Rng &rng) {
-    const auto most = static_cast<std::int64_t>(std::min<std::size_t>(4, runtime::usable_cpus().size()));
+    const auto most = static_cast<std::int64_t>(std::min<std::size_t>(16, runtime::usable_cpus().size()));
     return static_cast<std::uint32_t>(rng.uniform(1, most));
   }
 
