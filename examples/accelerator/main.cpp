@@ -72,8 +72,9 @@ int run(const Named &named, std::chrono::seconds duration) {
   ExecutorOptions options;
   options.workers = 1;
   options.measure = true;
-  options.devices = {{.name = "accelerator",  // one slot: one kernel at a time
-                      .queue = named.order == Order::Fifo ? redag::Device::Queue::Fifo : redag::Device::Queue::Priority}};
+  options.devices = {
+      {.name = "accelerator",  // one slot: one kernel at a time
+       .queue = named.order == Order::Fifo ? redag::Device::Queue::Fifo : redag::Device::Queue::Priority}};
   Executor executor(options);
   const DeviceHandle device = executor.device("accelerator");
   const auto body = [&](Accelerator::Work work, bool urgent) {
@@ -99,10 +100,11 @@ int run(const Named &named, std::chrono::seconds duration) {
   const TaskStats detect = executor.stats(camera_dag)[0];
   const TaskStats step = executor.stats(control_dag)[0];
   const auto ms = [&](redag::Duration time) { return static_cast<double>(time) / 1e6; };
-  std::printf("%s, %s: camera %llu frames, median %.2f ms, p99 %.2f ms, longest %.2f ms; control late %llu times of %llu\n",
-              accelerator.name().c_str(), named.text, static_cast<unsigned long long>(detect.jobs.finished),
-              ms(detect.response.percentile(0.5)), ms(detect.response.percentile(0.99)), ms(detect.response.longest()),
-              static_cast<unsigned long long>(step.late), static_cast<unsigned long long>(step.jobs.finished));
+  std::printf(
+      "%s, %s: camera %llu frames, median %.2f ms, p99 %.2f ms, longest %.2f ms; control late %llu times of %llu\n",
+      accelerator.name().c_str(), named.text, static_cast<unsigned long long>(detect.jobs.finished),
+      ms(detect.response.percentile(0.5)), ms(detect.response.percentile(0.99)), ms(detect.response.longest()),
+      static_cast<unsigned long long>(step.late), static_cast<unsigned long long>(step.jobs.finished));
   return detect.jobs.finished > 0 ? 0 : 1;
 }
 
