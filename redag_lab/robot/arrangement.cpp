@@ -16,6 +16,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
 
 #include "redag/base/cpu_list.hpp"
@@ -37,6 +38,7 @@ Json to_json(const ThreadState &state) {
               {"priority", state.scheduling.priority},
               {"nice", state.scheduling.nice},
               {"resets_on_fork", state.scheduling.resets_on_fork},
+              {"reservation", {state.scheduling.budget, state.scheduling.deadline, state.scheduling.period}},
               {"cpus", to_json(state.cpus)}};
 }
 
@@ -55,10 +57,15 @@ int number_in(const Json &json, const char *key, int least, int most) {
 ThreadState state_in(const Json &json) {
   Scheduling scheduling;
   scheduling.kind =
-      static_cast<Scheduling::Class>(number_in(json, "class", 0, static_cast<int>(Scheduling::Class::Idle)));
+      static_cast<Scheduling::Class>(number_in(json, "class", 0, static_cast<int>(Scheduling::Class::Deadline)));
   scheduling.priority = number_in(json, "priority", 0, 99);
   scheduling.nice = number_in(json, "nice", -20, 19);
   scheduling.resets_on_fork = json.at("resets_on_fork").get<bool>();
+  // States of earlier versions have no reservations.
+  if (const auto found = json.find("reservation"); found != json.end()) {
+    std::tie(scheduling.budget, scheduling.deadline, scheduling.period) =
+        found->get<std::tuple<Duration, Duration, Duration>>();
+  }
   return ThreadState{scheduling, cpus_in(json.at("cpus"))};
 }
 

@@ -135,6 +135,36 @@ TEST_F(ArrangementTest, AppliesAndUndoes) {
   EXPECT_FALSE(fs::exists(path_));
 }
 
+TEST_F(ArrangementTest, GivesAReservationAndTakesItBack) {
+  const Waiting a;
+  Changes changes;
+  changes.threads = {raise(a)};
+  ThreadChange &change = changes.threads[0];
+  // The thread comes from one processor, where it returns, and a reservation is for all.
+  change.after = change.before;
+  change.before.cpus = {change.before.cpus.back()};
+  ASSERT_TRUE(system_.set(change.thread, "a", change.before));
+  change.after.scheduling = Scheduling{.kind = Scheduling::Class::Deadline,
+                                       .resets_on_fork = true,
+                                       .budget = kMillisecond,
+                                       .deadline = 100 * kMillisecond,
+                                       .period = 100 * kMillisecond};
+  if (const Result<void> granted = system_.set(change.thread, "a", change.after); !granted) {
+    GTEST_SKIP() << to_string(granted.error());
+  }
+  ASSERT_TRUE(system_.set(change.thread, "a", change.before));
+  {
+    Arrangement arrangement = open();
+    const Result<bool> applied = arrangement.apply(changes, never_stops);
+    ASSERT_TRUE(applied) << to_string(applied.error());
+    EXPECT_EQ(now(change), change.after);
+  }
+  const Result<Arrangement::Undone> undone = open().undo();
+  ASSERT_TRUE(undone) << to_string(undone.error());
+  EXPECT_THAT(undone->remarks, ElementsAre());
+  EXPECT_EQ(now(change), change.before);
+}
+
 TEST_F(ArrangementTest, NotesEverythingBeforeTheFirstChange) {
   const Waiting a;
   Changes changes;

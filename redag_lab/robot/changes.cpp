@@ -74,13 +74,18 @@ class Comparison {
     if (entry) ++threads_of_entry_[*entry];
     ThreadState after = thread.state;
     const std::optional<Scheduling> wanted = entry ? plan_.of_threads[*entry] : std::nullopt;
-    if (wanted && thread.state.scheduling.kind == Scheduling::Class::Deadline) {
+    const bool is_reserved = thread.state.scheduling.kind == Scheduling::Class::Deadline;
+    if (wanted && is_reserved && wanted->kind != Scheduling::Class::Deadline) {
       changes_.remarks.push_back(
           fmt::format("thread '{}' ({}) has a reservation (SCHED_DEADLINE) and keeps it", thread.name, thread.id.tid));
     } else if (wanted && !is_same_level(*wanted, after.scheduling)) {
       after.scheduling = *wanted;
     }
-    set_cpus(entry, known, after);
+    if (after.scheduling.kind != Scheduling::Class::Deadline) {
+      set_cpus(entry, known, after);
+    } else if (!is_reserved && !snapshot_.cpus.empty()) {
+      after.cpus = snapshot_.cpus;  // The kernel gives no reservation to a thread that it may not put anywhere.
+    }
     if (after == thread.state) return;
     changes_.threads.push_back(
         ThreadChange{thread.id, thread.name, process.name,
@@ -127,7 +132,7 @@ class Comparison {
       const Threads &entry = robot_.threads[t];
       if (threads_of_entry_[t] == 0) {
         changes_.remarks.push_back(fmt::format("threads '{}': none runs", entry.name));
-      } else if (entry.wcet > 0 && threads_of_entry_[t] > entry.count) {
+      } else if (entry.is_counted() && threads_of_entry_[t] > entry.count) {
         changes_.remarks.push_back(fmt::format("threads '{}': {} run, and the bounds count {} ('count:')", entry.name,
                                                threads_of_entry_[t], entry.count));
       }

@@ -100,6 +100,15 @@ class Planner {
       case Level::Kind::Above: wanted = fifo(band_.top_job + 1); return;
       case Level::Kind::Below: wanted = fifo(1); return;
       case Level::Kind::Nice: wanted = Scheduling{Scheduling::Class::Other, 0, level.value, false}; return;
+      case Level::Kind::Reservation: {
+        const Reservation &each = level.reservation;
+        wanted = Scheduling{.kind = Scheduling::Class::Deadline,
+                            .resets_on_fork = true,
+                            .budget = each.budget,
+                            .deadline = each.period,
+                            .period = each.period};
+        return;
+      }
       case Level::Kind::Fifo: break;
     }
     wanted = fifo(level.value);

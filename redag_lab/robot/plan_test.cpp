@@ -153,7 +153,7 @@ Changes changes_with(const Robot &robot, const std::vector<LiveProcess> &process
                      const std::vector<LiveInterrupt> &interrupts = {}) {
   const Result<Plan> plan = plan_of(robot, runtime::band_up_to(90));
   EXPECT_TRUE(plan);
-  return changes_of(robot, *plan, Snapshot{processes, interrupts});
+  return changes_of(robot, *plan, Snapshot{processes, interrupts, {}});
 }
 
 TEST(RobotChanges, FindsThreadsByProcessAndName) {
@@ -197,6 +197,23 @@ TEST(RobotChanges, MovesInterruptsByNameOrNumber) {
   changes = changes_with(robot, {}, there);
   ASSERT_EQ(changes.interrupts.size(), 1u);
   EXPECT_EQ(changes.interrupts[0].number, 25);
+}
+
+TEST(RobotChanges, AReservationIsForAllProcessors) {
+  Robot robot = robot_from(kCart);
+  robot.threads[0].level =
+      Level{.kind = Level::Kind::Reservation, .reservation = {.budget = kMillisecond, .period = 9 * kMillisecond}};
+  Snapshot snapshot;
+  snapshot.cpus = {0, 1, 2, 3};
+  snapshot.processes = {{1, "a", "/opt/arm 1", "/", {thread(10, "loop")}}};
+  const Plan plan = *plan_of(robot, runtime::band_up_to(90));
+  Changes changes = changes_of(robot, plan, snapshot);
+  ASSERT_EQ(changes.threads.size(), 1u);
+  EXPECT_EQ(to_string(changes.threads[0].after.scheduling), "1ms every 9ms");
+  EXPECT_TRUE(changes.threads[0].after.scheduling.resets_on_fork);
+  EXPECT_EQ(changes.threads[0].after.cpus, snapshot.cpus) << "although the robot has two of them";
+  snapshot.processes[0].threads[0].state = changes.threads[0].after;
+  EXPECT_TRUE(changes_of(robot, plan, snapshot).is_empty());
 }
 
 TEST(RobotChanges, SayWhatDoesNotHold) {

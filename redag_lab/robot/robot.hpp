@@ -63,24 +63,34 @@ struct Link {
   Place place;
 };
 
+/// Processor time that the kernel grants a thread, and takes away when it is used up (SCHED_DEADLINE).
+struct Reservation {
+  Duration budget = 0;
+  Duration period = 0;
+  // Of the kernel, which only looks then whether the budget is used up: at least that of its CONFIG_HZ.
+  Duration tick = 0;
+};
+
 /// Where threads belong in the order.
 struct Level {
   enum class Kind : std::uint8_t {
-    Task,   // the level of a task, which they execute
-    Rate,   // that of a task of period `rate`
-    Above,  // above all tasks
-    Below,  // below all tasks, but above ordinary threads
-    Fifo,   // SCHED_FIFO with priority `value`
-    Nice,   // ordinary threads with nice `value`
+    Task,         // the level of a task, which they execute
+    Rate,         // that of a task of period `rate`
+    Above,        // above all tasks
+    Below,        // below all tasks, but above ordinary threads
+    Fifo,         // SCHED_FIFO with priority `value`
+    Nice,         // ordinary threads with nice `value`
+    Reservation,  // SCHED_DEADLINE: before all others, but no longer than `reservation` says
   };
   Kind kind = Kind::Nice;
   TaskOf task = {};  // Task
   Duration rate = 0;
   int value = 0;
+  Reservation reservation = {};
 
   /// True for a level at which the threads can keep tasks waiting that they do not execute.
   [[nodiscard]] bool interferes() const {
-    return kind == Kind::Rate || kind == Kind::Above || (kind == Kind::Fifo && value > 1);
+    return kind == Kind::Rate || kind == Kind::Above || kind == Kind::Reservation || (kind == Kind::Fifo && value > 1);
   }
 };
 
@@ -96,6 +106,9 @@ struct Threads {
   Duration wcet = 0;           // 0: unknown
   Duration period = 0;
   Place place;
+
+  /// True if the bounds count `count` of these threads.
+  [[nodiscard]] bool is_counted() const { return wcet > 0 || (level && level->kind == Level::Kind::Reservation); }
 };
 
 /// Interrupts by name, and the processors that serve them.

@@ -31,6 +31,11 @@ constexpr int kMostFifo = 99;
 constexpr int kLeastNice = -20;
 constexpr int kMostNice = 19;
 constexpr std::uint32_t kMostThreads = 256;
+// What Linux allows, and its coarsest tick.
+constexpr Duration kLeastBudget = 1024;
+constexpr Duration kLeastReserved = 100 * kMicrosecond;
+constexpr Duration kMostReserved = 4 * kSecond;
+constexpr Duration kCoarsestTick = 10 * kMillisecond;
 
 class RobotReader : private yaml::ValueReader {
  public:
@@ -354,6 +359,11 @@ class RobotReader : private yaml::ValueReader {
     take(node, "wcet", threads.wcet, [this](const Node &value, auto key) { return positive_duration(value, key); });
     take(node, "period", threads.period, [this](const Node &value, auto key) { return positive_duration(value, key); });
     check_load(node, threads);
+    if (threads.level && threads.level->kind == Level::Kind::Reservation && find(node, "cpus") != nullptr) {
+      error(*find(node, "cpus"),
+            fmt::format("threads '{}' have a reservation, which is for all processors", threads.name),
+            "remove 'cpus:'");
+    }
     robot_.threads.push_back(std::move(threads));
   }
 
@@ -367,6 +377,13 @@ class RobotReader : private yaml::ValueReader {
             "remove 'period:'; the rate is their period");
     }
     if (of_rate) threads.period = threads.level->rate;
+    if (threads.level && threads.level->kind == Level::Kind::Reservation) {
+      if (wcet == nullptr && period == nullptr) return;
+      error(wcet != nullptr ? *wcet : *period,
+            fmt::format("threads '{}' have a reservation, which says how long they delay tasks", threads.name),
+            "remove 'wcet:' and 'period:'");
+      return;
+    }
     if (threads.level && !threads.level->interferes() && (wcet != nullptr || period != nullptr)) {
       error(wcet != nullptr ? *wcet : *period,
             fmt::format("threads '{}' delay no task at this level, and need no wcet or period", threads.name),
@@ -389,14 +406,14 @@ class RobotReader : private yaml::ValueReader {
       return level;
     }
     if (node.kind != Node::Kind::Map) {
-      unknown_choice(
-          node, "level",
-          {"above", "below", "{task: PROCESS.DAG.TASK}", "{rate: PERIOD}", "{fifo: PRIORITY}", "{nice: NICE}"});
+      unknown_choice(node, "level",
+                     {"above", "below", "{task: PROCESS.DAG.TASK}", "{rate: PERIOD}", "{fifo: PRIORITY}",
+                      "{nice: NICE}", "{reservation: {budget: TIME, period: TIME}}"});
       return std::nullopt;
     }
-    if (!check_map(node, "level", {"task", "rate", "fifo", "nice"})) return std::nullopt;
+    if (!check_map(node, "level", {"task", "rate", "fifo", "nice", "reservation"})) return std::nullopt;
     if (node.children.size() != 2) {
-      error(node, "level must have one of task, rate, fifo and nice");
+      error(node, "level must have one of task, rate, fifo, nice and reservation");
       return std::nullopt;
     }
     const Node &value = node.children[1];
@@ -407,7 +424,10 @@ class RobotReader : private yaml::ValueReader {
                  ? std::optional(level)
                  : std::nullopt;
     }
-    if (find(node, "rate") != nullptr) {
+    if (find(node, "reservation") != nullptr) {
+      level.kind = Level::Kind::Reservation;
+      is_read = read_reservation(value, level.reservation);
+    } else if (find(node, "rate") != nullptr) {
       level.kind = Level::Kind::Rate;
       is_read = take(node, "rate", level.rate, [this](const Node &at, auto key) { return positive_duration(at, key); });
       if (robot_.policy == PolicyKind::Fixed) {
@@ -422,6 +442,32 @@ class RobotReader : private yaml::ValueReader {
       });
     }
     return is_read ? std::optional(level) : std::nullopt;
+  }
+
+  bool read_reservation(const Node &node, Reservation &out) {
+    if (!check_map(node, "reservation", {"budget", "period", "tick"})) return false;
+    for (const char *key : {"budget", "period"}) {
+      if (find(node, key) != nullptr) continue;
+      error(node, fmt::format("the reservation has no '{}'", key), "write {budget: 2ms, period: 10ms}");
+      return false;
+    }
+    const auto time = [this](const Node &at, auto key) { return positive_duration(at, key); };
+    out.tick = kCoarsestTick;
+    if (!take(node, "budget", out.budget, time) || !take(node, "period", out.period, time)) return false;
+    if (find(node, "tick") != nullptr && !take(node, "tick", out.tick, time)) return false;
+    const auto refuse_unless = [&](bool is_sound, const char *key, std::string message) {
+      if (!is_sound) error(*find(node, key), std::move(message));
+      return is_sound;
+    };
+    return refuse_unless(out.period >= kLeastReserved && out.period <= kMostReserved, "period",
+                         fmt::format("the period of a reservation must be between {} and {}",
+                                     format_duration(kLeastReserved), format_duration(kMostReserved))) &&
+           refuse_unless(out.budget >= kLeastBudget && out.budget <= out.period, "budget",
+                         fmt::format("the budget of a reservation must be between {} and its period {}",
+                                     format_duration(kLeastBudget), format_duration(out.period))) &&
+           refuse_unless(
+               out.tick <= kCoarsestTick, "tick",
+               fmt::format("the tick is at most {}, as no kernel has a longer one", format_duration(kCoarsestTick)));
   }
 
   // Finds "process.dag.task". Any of the names can contain dots.

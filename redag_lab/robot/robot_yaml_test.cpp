@@ -184,6 +184,29 @@ TEST(RobotYaml, WantsALoadThatIsComplete) {
             "cart.yaml:17:61: error: wcet 2ms of threads 't' exceeds their period 1ms");
 }
 
+TEST(RobotYaml, AReservationIsABudgetInAPeriod) {
+  const auto with = [](const std::string &reservation) {
+    return findings(with_threads("{name: t, match: {thread: a}, level: {reservation: " + reservation + "}}"));
+  };
+  EXPECT_EQ(with("{budget: 2ms, period: 10ms}"), "");
+  EXPECT_EQ(with("{budget: 2ms, period: 10ms, tick: 1ms}"), "");
+  EXPECT_EQ(with("{budget: 2ms}"),
+            "cart.yaml:17:56: error: the reservation has no 'period' (write {budget: 2ms, period: 10ms})");
+  EXPECT_EQ(with("{budget: 20ms, period: 10ms}"),
+            "cart.yaml:17:65: error: the budget of a reservation must be between 1024ns and its period 10ms");
+  EXPECT_EQ(with("{budget: 2us, period: 10us}"),
+            "cart.yaml:17:78: error: the period of a reservation must be between 0.1ms and 4s");
+  EXPECT_EQ(with("{budget: 2ms, period: 10ms, tick: 20ms}"),
+            "cart.yaml:17:90: error: the tick is at most 10ms, as no kernel has a longer one");
+  EXPECT_EQ(findings(with_threads("{name: t, match: {thread: a}, level: {reservation: {budget: 2ms, period: 9ms}}, "
+                                  "wcet: 1ms, period: 2ms}")),
+            "cart.yaml:17:91: error: threads 't' have a reservation, which says how long they delay tasks (remove "
+            "'wcet:' and 'period:')");
+  EXPECT_EQ(findings(with_threads("{name: t, match: {thread: a}, level: {reservation: {budget: 2ms, period: 9ms}}, "
+                                  "cpus: 0}")),
+            "cart.yaml:17:91: error: threads 't' have a reservation, which is for all processors (remove 'cpus:')");
+}
+
 TEST(RobotYaml, ReportsMistakesOfInlineWorkloadsAtTheirLines) {
   EXPECT_EQ(findings("robot: cart\ncpus: 0\nprocesses:\n  - name: a\n    match: {name: a}\n    workload:\n"
                      "      dags:\n        - name: d\n          tasks: [{name: t, wcet: 1, period: 5ms}]\n"),

@@ -93,8 +93,13 @@ std::uint32_t policy_of(Scheduling::Class kind) {
 std::optional<Scheduling> scheduling_of(pid_t tid) {
   Attributes attributes;
   if (syscall(SYS_sched_getattr, tid, &attributes, sizeof(attributes), 0U) != 0) return std::nullopt;
-  return Scheduling{class_of(attributes.policy), static_cast<int>(attributes.priority), attributes.nice,
-                    (attributes.flags & kResetOnFork) != 0};
+  return Scheduling{.kind = class_of(attributes.policy),
+                    .priority = static_cast<int>(attributes.priority),
+                    .nice = attributes.nice,
+                    .resets_on_fork = (attributes.flags & kResetOnFork) != 0,
+                    .budget = static_cast<Duration>(attributes.runtime),
+                    .deadline = static_cast<Duration>(attributes.deadline),
+                    .period = static_cast<Duration>(attributes.period)};
 }
 
 std::optional<std::vector<int>> affinity_of(pid_t tid) {
@@ -133,7 +138,18 @@ bool set_scheduling(pid_t tid, const Scheduling &wanted) {
   attributes.flags = wanted.resets_on_fork ? kResetOnFork : 0;
   attributes.nice = wanted.nice;
   attributes.priority = static_cast<std::uint32_t>(wanted.priority);
+  attributes.runtime = static_cast<std::uint64_t>(wanted.budget);
+  attributes.deadline = static_cast<std::uint64_t>(wanted.deadline);
+  attributes.period = static_cast<std::uint64_t>(wanted.period);
   return syscall(SYS_sched_setattr, tid, &attributes, 0U) == 0;
+}
+
+std::string hint_for(const Scheduling &refused, int error) {
+  if (refused.kind != Scheduling::Class::Deadline) return error == EPERM ? runtime::realtime_hint() : "";
+  if (error == EPERM) return "a reservation needs root or CAP_SYS_NICE, and a thread that may run on all processors";
+  if (error != EBUSY) return "";
+  return "all reservations together may have the share of each processor that real-time threads have "
+         "(/proc/sys/kernel/sched_rt_runtime_us)";
 }
 
 std::string described(const ThreadId &thread, const std::string &name) {
@@ -148,14 +164,16 @@ std::string to_string(const Scheduling &scheduling) {
     case Scheduling::Class::RoundRobin: return fmt::format("RR {}", scheduling.priority);
     case Scheduling::Class::Batch: return fmt::format("batch, nice {}", scheduling.nice);
     case Scheduling::Class::Idle: return "idle";
-    case Scheduling::Class::Deadline: return "deadline";
+    case Scheduling::Class::Deadline:
+      return fmt::format("{} every {}", format_duration(scheduling.budget), format_duration(scheduling.period));
     case Scheduling::Class::Other: break;
   }
   return fmt::format("nice {}", scheduling.nice);
 }
 
 bool is_same_level(const Scheduling &a, const Scheduling &b) {
-  return a.kind == b.kind && a.priority == b.priority && a.nice == b.nice;
+  return a.kind == b.kind && a.priority == b.priority && a.nice == b.nice && a.budget == b.budget &&
+         a.deadline == b.deadline && a.period == b.period;
 }
 
 std::optional<std::uint64_t> System::start_of(std::int64_t pid, std::int64_t tid) const {
@@ -187,6 +205,7 @@ std::vector<LiveThread> System::threads_of(std::int64_t pid) const {
 
 Snapshot System::read() const {
   Snapshot snapshot;
+  snapshot.cpus = parse_cpu_list(first_line("/sys/devices/system/cpu/online")).value_or(std::vector<int>{});
   for (const std::int64_t pid : numbers_in(proc_)) {
     if (pid == getpid()) continue;
     const std::string place = fmt::format("{}/{}/", proc_, pid);
@@ -242,6 +261,18 @@ Result<void> System::set(const ThreadId &thread, const std::string &name, const 
   const std::optional<ThreadState> now = state_of(thread);
   if (!now) return {};
   const auto tid = static_cast<pid_t>(thread.tid);
+  const auto schedule = [&]() -> Result<void> {
+    if (now->scheduling == wanted.scheduling || set_scheduling(tid, wanted.scheduling) || errno == ESRCH) return {};
+    const int error = errno;
+    return make_error(fmt::format("{} cannot get {}: {}", described(thread, name), to_string(wanted.scheduling),
+                                  std::strerror(error)),
+                      hint_for(wanted.scheduling, error));
+  };
+  // The kernel pins no thread that has a reservation.
+  const bool had_reservation = now->scheduling.kind == Scheduling::Class::Deadline;
+  if (had_reservation) {
+    if (Result<void> done = schedule(); !done) return done;
+  }
   if (now->cpus != wanted.cpus && !set_affinity(tid, wanted.cpus) && errno != ESRCH) {
     return make_error(fmt::format("{} cannot run on processors {} only: {}", described(thread, name),
                                   format_cpu_list(wanted.cpus), std::strerror(errno)),
@@ -254,12 +285,7 @@ Result<void> System::set(const ThreadId &thread, const std::string &name, const 
                                   format_cpu_list(*cpus), format_cpu_list(wanted.cpus)),
                       "does the machine have them, and its cpuset?");
   }
-  if (now->scheduling != wanted.scheduling && !set_scheduling(tid, wanted.scheduling) && errno != ESRCH) {
-    return make_error(fmt::format("{} cannot get {}: {}", described(thread, name), to_string(wanted.scheduling),
-                                  std::strerror(errno)),
-                      errno == EPERM ? runtime::realtime_hint() : "");
-  }
-  return {};
+  return had_reservation ? Result<void>() : schedule();
 }
 
 Result<void> System::set_cpus(int interrupt, const std::vector<int> &cpus) const {

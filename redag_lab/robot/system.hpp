@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
+#include "redag/base/time.hpp"
 
 namespace redag::robot {
 
@@ -23,14 +24,18 @@ struct Scheduling {
   // Threads that it creates begin as ordinary ones. Whoever raises a foreign thread wants this: otherwise it would
   // raise others without knowing.
   bool resets_on_fork = false;
+  // Deadline: the processor time that it has in each period, until the deadline.
+  Duration budget = 0;
+  Duration deadline = 0;
+  Duration period = 0;
 
   friend bool operator==(const Scheduling &, const Scheduling &) = default;
 };
 
-/// For people: "FIFO 80", "nice -5".
+/// For people: "FIFO 80", "nice -5", "2ms every 10ms".
 [[nodiscard]] std::string to_string(const Scheduling &scheduling);
 
-/// True if both have the same class, priority and nice.
+/// True if both have the same class, priority, nice and reservation.
 [[nodiscard]] bool is_same_level(const Scheduling &a, const Scheduling &b);
 
 struct ThreadState {
@@ -72,6 +77,7 @@ struct LiveInterrupt {
 struct Snapshot {
   std::vector<LiveProcess> processes;
   std::vector<LiveInterrupt> interrupts;
+  std::vector<int> cpus;  // of the machine, those that are in use
 };
 
 class System {

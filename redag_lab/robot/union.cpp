@@ -11,6 +11,7 @@
 #include "redag/model/validate.hpp"
 #include "redag_lab/robot/links.hpp"
 #include "redag_lab/robot/order.hpp"
+#include "redag_lab/robot/reservation.hpp"
 
 namespace redag::robot {
 namespace {
@@ -19,7 +20,9 @@ namespace {
 std::string joined(const std::string &process, const std::string &name) { return process + "/" + name; }
 
 constexpr const char *kThreads = "threads";
-constexpr int kAbove = -1;  // the level above those of the order
+// The levels above those of the order.
+constexpr int kAbove = -1;
+constexpr int kReserved = -2;
 
 class Union {
  public:
@@ -123,22 +126,49 @@ class Union {
     if (!threads.level->interferes()) return;
     const std::optional<std::size_t> set = set_of(threads);
     if (!set) return;
+    if (threads.level->kind == Level::Kind::Reservation) return add_reserved(threads, *set);
     if (threads.wcet == 0) {
       refuse(threads.place, fmt::format("threads '{}' can delay tasks, and nothing says for how long", threads.name),
              "add 'wcet:' and 'period:': what one of them executes at most, and how often; or use a level below");
       return;
     }
+    Task task;
+    task.wcet = threads.wcet;
+    task.period = task.deadline = threads.period;
+    add_interference(threads, *set, task, order_.of_threads[t] ? static_cast<int>(*order_.of_threads[t]) : kAbove);
+  }
+
+  // The bound for one of them assumes that it has a processor whenever the kernel lets it run.
+  void add_reserved(const Threads &threads, std::size_t set) {
+    reserved_ += threads.count;
+    const std::size_t cpus = robot_.cpu_sets[set].cpus.size();
+    if (reserved_ > cpus) {
+      refuse(threads.place,
+             fmt::format("{} threads have reservations, and there are {} processors: they can delay each other, which "
+                         "no bound covers",
+                         reserved_, cpus),
+             "give fewer threads a reservation");
+      return;
+    }
+    const ReservedLoad load = load_of(threads.level->reservation);
+    Task task;
+    task.wcet = load.wcet;
+    task.period = task.deadline = load.period;
+    task.jitter = load.jitter;
+    add_interference(threads, set, task, kReserved);
+  }
+
+  // Adds a DAG with `count` such tasks.
+  void add_interference(const Threads &threads, std::size_t set, Task task, int level) {
     Dag &dag = workload_.dags.emplace_back();
     dag.name = joined(kThreads, threads.name);
     for (std::uint32_t i = 0; i < threads.count; ++i) {
-      Task &task = dag.tasks.emplace_back();
       task.name = threads.count == 1 ? "run" : fmt::format("run_{}", i + 1);
-      task.wcet = threads.wcet;
-      task.period = task.deadline = threads.period;
-      levels_.push_back(order_.of_threads[t] ? static_cast<int>(*order_.of_threads[t]) : kAbove);
+      dag.tasks.push_back(task);
+      levels_.push_back(level);
     }
-    has_above_ = has_above_ || !order_.of_threads[t];
-    set_of_dag_.push_back(*set);
+    has_above_ = has_above_ || level < 0;
+    set_of_dag_.push_back(set);
   }
 
   // Returns the CPU set where these threads run; nothing if no task runs where they do, or after a refusal.
@@ -156,7 +186,9 @@ class Union {
     if (met.size() == 1 && (threads.cpus.empty() || threads.cpus == cpus)) return met.front();
     refuse(threads.place,
            fmt::format("threads '{}' can delay tasks, and their processors are not those of one CPU set", threads.name),
-           "give them the 'cpus:' of one CPU set, or processors of none");
+           threads.level->kind == Level::Kind::Reservation
+               ? "a reservation is for all processors: give the robot 'cpus' instead of 'cpu_sets'"
+               : "give them the 'cpus:' of one CPU set, or processors of none");
     return std::nullopt;
   }
 
@@ -195,6 +227,7 @@ class Union {
   std::vector<std::size_t> set_of_dag_;
   std::vector<int> levels_;              // by TaskId of the union
   std::vector<std::size_t> first_task_;  // by process: the first of its tasks in the union
+  std::size_t reserved_ = 0;             // threads with reservations
   bool has_above_ = false;               // some task is above all levels of the order
 };
 

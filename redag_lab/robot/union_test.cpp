@@ -235,6 +235,33 @@ TEST(RobotUnion, ThreadsAboveComeFirstWhateverTheirPeriod) {
   EXPECT_EQ(order[1].level, 2u);
 }
 
+TEST(RobotUnion, ReservationsComeBeforeAllOthersAndAreBounded) {
+  Robot robot = robot_of({one_task(5), one_task(20)});
+  robot.threads.push_back(threads_at(Level::Kind::Above, kMillisecond, 50 * kMillisecond));
+  robot.threads.push_back(threads_at(Level::Kind::Reservation, 0, 0));
+  robot.threads[1].name = "y";
+  robot.threads[1].level->reservation = {.budget = kMillisecond, .period = 20 * kMillisecond, .tick = kMillisecond};
+  const Result<LoadedWorkload> united = union_of(robot, kLevels);
+  ASSERT_TRUE(united) << to_string(united.error());
+  const auto order = sched::assign_priorities(united->workload.dags, united->workload.policy, Ties::Share);
+  EXPECT_EQ(order[3].level, 0u);
+  EXPECT_EQ(order[2].level, 1u);
+  const Task &task = united->workload.dags[3].tasks[0];
+  EXPECT_EQ(task.wcet, 4 * kMillisecond);
+  EXPECT_EQ(task.period, 80 * kMillisecond);
+  EXPECT_EQ(task.jitter, 58 * kMillisecond);
+  robot.threads[1].count = 3;
+  EXPECT_EQ(refusal(robot),
+            "cart.yaml:30:5: error: 3 threads have reservations, and there are 2 processors: they can delay each "
+            "other, which no bound covers (give fewer threads a reservation)");
+  robot.threads[1].count = 1;
+  robot.cpu_sets = {CpuSet{"a", {0}}, CpuSet{"b", {1}}};
+  robot.threads[0].cpus = {0};
+  EXPECT_EQ(refusal(robot),
+            "cart.yaml:30:5: error: threads 'y' can delay tasks, and their processors are not those of one CPU set (a "
+            "reservation is for all processors: give the robot 'cpus' instead of 'cpu_sets')");
+}
+
 TEST(RobotUnion, RefusesThreadsThatDelayTasksForAnUnknownTime) {
   Robot robot = robot_of({one_task(5), one_task(20)});
   robot.threads.push_back(threads_at(Level::Kind::Above, 0, 0));
