@@ -28,6 +28,7 @@ processes:
     workload: {dags: [{name: d, tasks: [{name: t, wcet: 1ms, period: 5ms}]}]}
 threads:
   - {name: t, match: {process: arm, thread: rx}, level: {task: arm.d.t}}
+  - {name: u, match: {process: arm, thread: ux}, level: {reservation: {budget: 1ms, period: 5ms, tick: 4ms}}}
 irqs:
   - {name: i, match: "eth*", cpus: fast}
 """
