@@ -171,7 +171,9 @@ class Tools:
         self.pkgconfig = next(self.prefix.rglob("redag.pc")).parent
         # Headers of ROS 2, which the compiler takes as the system's, and of this repository's package for it.
         newest = sorted(pathlib.Path("/opt/ros").glob("*/include/rclcpp/rclcpp"))[-1:]
-        self.ros = [f"-isystem {folder}" for place in newest for folder in place.parents[1].iterdir()]
+        # include/rclcpp/rclcpp, but not include/idl/endian.h of Cyclone DDS, which would hide the C library's.
+        self.ros = [f"-isystem {folder}" for place in newest for folder in place.parents[1].iterdir()
+                    if (folder / folder.name).is_dir()]
         if self.ros:
             self.ros += [f"-I{source / 'redag_rclcpp' / 'include'}", f"-I{self.prefix / 'include' / 'redag-internal'}"]
         self.bin = scratch / "bin"
