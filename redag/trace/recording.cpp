@@ -3,6 +3,7 @@
 
 #include "redag/trace/recording.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace redag::trace {
@@ -18,7 +19,12 @@ Result<void> Recording::visit(const Visit &visit) const {
     reader_->rewind();
     return reader_->visit(visit);
   }
-  visit(trace_->events);
+  constexpr std::size_t kPortion = 65'536;  // as of a file
+  for (std::span<const JobEvent> rest = trace_->events; !rest.empty();) {
+    const std::span<const JobEvent> first = rest.first(std::min(kPortion, rest.size()));
+    visit(first);
+    rest = rest.subspan(first.size());
+  }
   return {};
 }
 
