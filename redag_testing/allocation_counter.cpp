@@ -12,13 +12,13 @@
 namespace {
 
 thread_local std::uint64_t allocations = 0;
-thread_local std::int64_t bytes = 0;
-thread_local std::int64_t most_bytes = 0;
+thread_local std::int64_t live_bytes = 0;
+thread_local std::int64_t most_live_bytes = 0;
 
 void *noted(void *memory) {
   ++allocations;
-  bytes += static_cast<std::int64_t>(::malloc_usable_size(memory));
-  most_bytes = std::max(most_bytes, bytes);
+  live_bytes += static_cast<std::int64_t>(::malloc_usable_size(memory));
+  most_live_bytes = std::max(most_live_bytes, live_bytes);
   return memory;
 }
 
@@ -34,7 +34,7 @@ void *counted(std::size_t size, std::align_val_t alignment) {
 }
 
 void release(void *memory) {
-  bytes -= static_cast<std::int64_t>(::malloc_usable_size(memory));
+  live_bytes -= static_cast<std::int64_t>(::malloc_usable_size(memory));
   std::free(memory);
 }
 
@@ -44,8 +44,8 @@ namespace redag::testing {
 
 std::uint64_t allocation_count() { return allocations; }
 
-PeakMemory::PeakMemory() : before_(bytes) { most_bytes = bytes; }
-std::int64_t PeakMemory::bytes() const { return most_bytes - before_; }
+PeakMemory::PeakMemory() : before_(live_bytes) { most_live_bytes = live_bytes; }
+std::int64_t PeakMemory::bytes() const { return most_live_bytes - before_; }
 
 }  // namespace redag::testing
 

@@ -248,7 +248,7 @@ class TextSource final : public EventsSource {
   InputFile file_;
   std::uint64_t offset_ = 0;
   std::uint64_t first_ = 0;  // offset of the line after the run
-  int line_ = 0;  // the last one that was read
+  int line_ = 0;             // the last one that was read
   std::uint64_t count_ = 0;
   std::size_t task_count_ = 0;
   std::optional<EventsFooter> seen_;

@@ -68,8 +68,7 @@ class AssumptionWatch {
     judge_waiting(kNever);
     for (std::size_t t = 0; t < refs_.size(); ++t) {
       ExecutionCheck &execution = check_.tasks[t].execution;
-      execution.is_exceeded =
-          is_beyond_noise(excess_[t], execution.jobs, refs_[t].task->wcet, check_.allowed.noise);
+      execution.is_exceeded = is_beyond_noise(excess_[t], execution.jobs, refs_[t].task->wcet, check_.allowed.noise);
     }
     return std::any_of(worst_.begin(), worst_.end(), [](const auto &worst) { return worst.has_value(); });
   }
@@ -133,9 +132,8 @@ class AssumptionWatch {
                                [](Time release, const LateRelease &late) { return release < late.release; });
     const auto is_later = [&](const LateRelease &late) { return late.lateness >= lateness; };
     if (std::any_of(at, late_.end(), is_later)) return;
-    const auto first = std::find_if_not(std::make_reverse_iterator(at), late_.rend(), [&](const LateRelease &late) {
-      return late.lateness <= lateness;
-    });
+    const auto first = std::find_if_not(std::make_reverse_iterator(at), late_.rend(),
+                                        [&](const LateRelease &late) { return late.lateness <= lateness; });
     at = late_.erase(first.base(), at);
     late_.insert(at, {event.value, lateness});
     if (late_.size() > kMostWaiting) late_.erase(late_.begin());
@@ -232,8 +230,8 @@ class AssumptionWatch {
   bool is_virtual_time_;
   JobFolder first_;
   JobFolder second_;
-  std::vector<LateRelease> late_;  // in order of release, with decreasing lateness
-  std::vector<Above> waiting_;     // executions that are not judged yet
+  std::vector<LateRelease> late_;                // in order of release, with decreasing lateness
+  std::vector<Above> waiting_;                   // executions that are not judged yet
   std::vector<DurationSketch> excess_;           // by TaskId, of executions above the wcet
   std::vector<std::optional<JobRecord>> worst_;  // by TaskId, of responses above the bound
   std::vector<During> during_;                   // by TaskId

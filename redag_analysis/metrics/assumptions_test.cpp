@@ -104,7 +104,8 @@ class Jobs {
       add(JobEventKind::Executed, finish, job.times.processor);
       add(JobEventKind::Finished, finish, finish);
     }
-    std::stable_sort(events.begin(), events.end(), [](const JobEvent &a, const JobEvent &b) { return a.time < b.time; });
+    std::stable_sort(events.begin(), events.end(),
+                     [](const JobEvent &a, const JobEvent &b) { return a.time < b.time; });
     return events;
   }
 

@@ -81,9 +81,7 @@ void JobFolder::add(const JobEvent &event) {
       ++record.preemptions;
       found->stay.move(Stay::Preempted, event.time);
       break;
-    case JobEventKind::Waits:
-      found->stay.move(event.value < 0 ? Stay::Waits : Stay::DeviceQueue, event.time);
-      break;
+    case JobEventKind::Waits: found->stay.move(event.value < 0 ? Stay::Waits : Stay::DeviceQueue, event.time); break;
     case JobEventKind::Served: found->stay.move(Stay::Device, event.time); break;
     case JobEventKind::Woken: found->stay.move(Stay::Ready, event.time); break;
     case JobEventKind::Resumed: found->stay.move(Stay::OnWorker, event.time); break;

@@ -321,8 +321,7 @@ Result<void> Investigation::explain(std::span<const Subject> subjects, const Vis
 
 Result<std::vector<Explanation>> Investigation::explain(std::span<const Subject> subjects) const {
   std::vector<Explanation> all(subjects.size());
-  const Result<void> read =
-      explain(subjects, [&](std::size_t index, Explanation one) { all[index] = std::move(one); });
+  const Result<void> read = explain(subjects, [&](std::size_t index, Explanation one) { all[index] = std::move(one); });
   if (!read) return tl::unexpected<Diagnostics>(read.error());
   return all;
 }

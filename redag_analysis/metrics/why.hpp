@@ -3,8 +3,8 @@
 
 // Explains where the time of a job went, from its release to its end, or end to end: backwards along the data that it
 // waited for. The parts of an explanation sum exactly to that time. A part has a cause only where the trace, or the
-// kernel's record of the run, shows it; other time is called unknown. why_text.hpp has the words. Reads the run's events
-// several times; memory grows with the jobs to explain, and not with the run. Not thread-safe.
+// kernel's record of the run, shows it; other time is called unknown. why_text.hpp has the words. Reads the run's
+// events several times; memory grows with the jobs to explain, and not with the run. Not thread-safe.
 #pragma once
 
 #include <cstddef>

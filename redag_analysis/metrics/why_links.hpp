@@ -41,8 +41,8 @@ struct Wait {
 };
 
 struct LinkedJob {
-  JobRecord record;        // of a job that has not ended, only what its release tells
-  bool has_ended = false;  // or the run has: `record` is complete
+  JobRecord record;                // of a job that has not ended, only what its release tells
+  bool has_ended = false;          // or the run has: `record` is complete
   std::shared_ptr<Ending> ending;  // if one waits for it
   /// The predecessor's job that completed the job's data, or whose end it still waited for; null: there is none.
   JobHandle last;

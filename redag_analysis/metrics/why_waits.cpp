@@ -49,8 +49,7 @@ class ClusterWaits {
     replay_.apply(event);
     if (follow != nullptr) followed_.push_back({event.task, event.job, std::move(follow)});
     if (followed_.empty() || replay_.find(event.task, event.job) != nullptr) return;
-    std::erase_if(followed_,
-                  [&](const Followed &one) { return one.task == event.task && one.number == event.job; });
+    std::erase_if(followed_, [&](const Followed &one) { return one.task == event.task && one.number == event.job; });
   }
 
  private:
@@ -188,10 +187,7 @@ class ClusterWaits {
 class WaitWatch::Impl {
  public:
   Impl(const trace::RunInfo &run, IsChosen is_chosen)
-      : run_(run),
-        is_chosen_(std::move(is_chosen)),
-        parts_(parts_of(run.workload)),
-        places_(places_in(parts_)) {
+      : run_(run), is_chosen_(std::move(is_chosen)), parts_(parts_of(run.workload)), places_(places_in(parts_)) {
     for (const ClusterPart &part : parts_) clusters_.emplace_back(part, run);
   }
 

@@ -12,7 +12,7 @@ namespace redag::report {
 namespace {
 
 constexpr std::uint64_t kBodyPoints = 60;  // evenly over the first nine tenths
-constexpr double kPointsPerDecade = 20;  // of the remaining share
+constexpr double kPointsPerDecade = 20;    // of the remaining share
 
 // Thins out `all`, which has each different value with the number of values up to it.
 std::vector<CurvePoint> thinned(const std::vector<CurvePoint> &all) {

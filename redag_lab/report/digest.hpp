@@ -52,8 +52,8 @@ struct RunDigest {
 /// The job with the largest lateness relative to its deadline.
 struct LatestJob {
   metrics::JobRecord record;
-  std::string path;  // folder of its run
-  Time since = 0;    // its release, from the start of the run
+  std::string path;     // folder of its run
+  Time since = 0;       // its release, from the start of the run
   std::size_t run = 0;  // the number of its run in the group
 };
 
@@ -112,8 +112,8 @@ class Group {
   std::string label_;
   DigestOptions options_;
   std::vector<RunDigest> runs_;
-  std::vector<bool> is_sink_;                      // by TaskId
-  std::vector<Samples> samples_;                   // by TaskId; `responses` once the group is finished
+  std::vector<bool> is_sink_;                        // by TaskId
+  std::vector<Samples> samples_;                     // by TaskId; `responses` once the group is finished
   std::vector<metrics::DurationSketch> responses_;   // by TaskId: f - r, until then
   std::vector<metrics::DurationSketch> end_to_end_;  // by TaskId: f - origin, of sinks
   std::optional<LatestJob> latest_;

@@ -49,7 +49,11 @@ using Latest = FirstFew<Time, std::greater<>>;
 class Survey {
  public:
   explicit Survey(const trace::RunInfo &run)
-      : refs_(flatten(run.workload)), end_(run.end), slices_of_run_(run), folder_(run.workload), worst_(run.workload.dags.size()) {}
+      : refs_(flatten(run.workload)),
+        end_(run.end),
+        slices_of_run_(run),
+        folder_(run.workload),
+        worst_(run.workload.dags.size()) {}
 
   void add(std::span<const JobEvent> events) {
     slices_of_run_.add(events);
@@ -100,8 +104,7 @@ class Survey {
     const Duration relative = std::max<Duration>(1, job.deadline - job.release);
     const double share = static_cast<double>(job.lateness()) / static_cast<double>(relative);
     std::optional<Worst> &dag = worst_[refs_[job.task.value].dag.value];
-    const bool is_worse =
-        !dag || share > dag->share || (share == dag->share && job.sequence < dag->job.sequence);
+    const bool is_worse = !dag || share > dag->share || (share == dag->share && job.sequence < dag->job.sequence);
     if (is_worse) dag = Worst{job, share};
   }
 

@@ -130,8 +130,8 @@ TEST(Schedule, WindowsHaveTheirShareOfSlicesAndAllJobsWithin) {
       return each.task == view.task && each.number == view.job;
     });
     ASSERT_NE(job, jobs.end());
-    const auto later = std::find_if(slices.begin(), slices.end(),
-                                    [&](const Slice &slice) { return slice.begin >= job->finish; });
+    const auto later =
+        std::find_if(slices.begin(), slices.end(), [&](const Slice &slice) { return slice.begin >= job->finish; });
     const auto index = static_cast<std::size_t>(later - slices.begin());
     const std::size_t first = index > kShare * 3 / 4 ? index - kShare * 3 / 4 : 0;
     EXPECT_EQ(window.begin, first == 0 ? 0 : slices[first].begin);

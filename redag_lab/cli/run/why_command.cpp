@@ -144,9 +144,9 @@ class Explaining {
     Result<std::optional<metrics::Subject>> found =
         is_number ? investigation.find({task, number}) : Result<std::optional<metrics::Subject>>(std::nullopt);
     if (found && !*found) {
-      console_.error(fmt::format("{} has no job {} in this run", name, in_quotes(text)),
-                     fmt::format("its jobs are 0 to {}; '{}' alone is its worst one", investigation.last_number(task),
-                                 name));
+      console_.error(
+          fmt::format("{} has no job {} in this run", name, in_quotes(text)),
+          fmt::format("its jobs are 0 to {}; '{}' alone is its worst one", investigation.last_number(task), name));
     }
     return found;
   }
