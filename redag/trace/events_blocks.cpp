@@ -135,7 +135,13 @@ class BlockSource final : public EventsSource {
     info.end = footer.end;
     info.lost_events = footer.lost_events;
     codec_ = EventCodec(info.workload.task_count());
+    first_ = offset_;
     return {};
+  }
+
+  void rewind() override {
+    offset_ = first_;
+    count_ = 0;
   }
 
   Result<bool> next(std::vector<JobEvent> &events) override {
@@ -208,6 +214,7 @@ class BlockSource final : public EventsSource {
 
   InputFile file_;
   std::uint64_t offset_;     // of the next block
+  std::uint64_t first_ = 0;  // offset of the first block of events
   std::uint64_t block_ = 0;  // of the last one that was read
   BlockHeader header_;       // of the same
   std::string whole_;

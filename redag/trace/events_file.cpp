@@ -83,6 +83,8 @@ std::uint64_t EventsReader::events() const { return source_->footer.events; }
 
 Result<bool> EventsReader::next(std::vector<JobEvent> &events) { return source_->next(events); }
 
+void EventsReader::rewind() { source_->rewind(); }
+
 Result<void> EventsReader::visit(const std::function<void(std::span<const JobEvent>)> &visit) {
   std::vector<JobEvent> events;
   for (;;) {

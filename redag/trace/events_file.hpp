@@ -75,6 +75,8 @@ class EventsReader {
   [[nodiscard]] Result<bool> next(std::vector<JobEvent> &events);
   /// Passes all further events to `visit`, some at a time.
   [[nodiscard]] Result<void> visit(const std::function<void(std::span<const JobEvent>)> &visit);
+  /// The first events are next again.
+  void rewind();
 
  private:
   explicit EventsReader(std::unique_ptr<EventsSource> source);

@@ -36,6 +36,8 @@ class EventsSource {
   virtual ~EventsSource() = default;
   /// As EventsReader::next().
   [[nodiscard]] virtual Result<bool> next(std::vector<JobEvent> &events) = 0;
+  /// The first events are next again.
+  virtual void rewind() = 0;
 
   RunInfo info;  // complete
   EventsFooter footer;

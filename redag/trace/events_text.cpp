@@ -143,6 +143,13 @@ class TextSource final : public EventsSource {
     return {};
   }
 
+  void rewind() override {
+    offset_ = first_;
+    line_ = 1;
+    count_ = 0;
+    seen_.reset();
+  }
+
   Result<bool> next(std::vector<JobEvent> &events) override {
     events.clear();
     while (events.empty()) {
@@ -200,6 +207,7 @@ class TextSource final : public EventsSource {
     std::string_view rest = *lines;
     const std::string_view line = next_line(rest);
     offset_ -= rest.size();
+    first_ = offset_;
     line_ = 1;
     Result<RunInfo> run = run_header_from_json(line, kTextFormat, "an event trace", file_.name());
     if (!run) return tl::unexpected<Diagnostics>(std::move(run.error()));
@@ -239,7 +247,8 @@ class TextSource final : public EventsSource {
 
   InputFile file_;
   std::uint64_t offset_ = 0;
-  int line_ = 0;  // the last one that was read
+  std::uint64_t first_ = 0;  // offset of the line after the run
+  int line_ = 0;             // the last one that was read
   std::uint64_t count_ = 0;
   std::size_t task_count_ = 0;
   std::optional<EventsFooter> seen_;

@@ -5,12 +5,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
+#include <iterator>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "redag/base/text.hpp"
+#include "redag_analysis/metrics/jobs.hpp"
+#include "redag_analysis/metrics/summary.hpp"
 
 namespace redag::metrics {
 namespace {
@@ -29,126 +31,210 @@ Duration slack_of(const JobRecord &job, const Overheads &allowed) {
 
 Duration most_noise(Duration wcet, const Loss &noise) { return (kMargin - 1) * noise.longest + noise.in(wcet); }
 
-class Checker {
+// Follows the events of a run twice. In the first pass it judges executions and responses; in the second one it looks
+// at what happened during the worst responses.
+class AssumptionWatch {
  public:
-  Checker(const Workload &workload, std::uint32_t workers, const std::optional<Overheads> &calibrated,
-          std::span<const JobRecord> jobs)
-      : refs_(flatten(workload)), workers_(workers), calibrated_(calibrated), jobs_(jobs) {
-    check_.is_calibrated = calibrated.has_value();
-    check_.workers = workers;
-    check_.allowed = calibrated.value_or(plausible_overheads());
+  /// `run` must outlive this object.
+  AssumptionWatch(const trace::RunInfo &run, const BoundOf &bound_of)
+      : refs_(flatten(run.workload)),
+        calibrated_(parse_overheads(run.overheads)),
+        is_virtual_time_(run.driver == trace::Driver::Simulator),
+        first_(run.workload),
+        second_(run.workload),
+        excess_(refs_.size(), DurationSketch(exact_jobs_of_task(refs_.size()))),
+        worst_(refs_.size()),
+        during_(refs_.size()) {
+    check_.is_calibrated = calibrated_.has_value();
+    check_.workers = run.config.workers;
+    check_.allowed = calibrated_.value_or(plausible_overheads());
     check_.tasks.resize(refs_.size());
-    for (std::size_t t = 0; t < refs_.size(); ++t) check_.tasks[t].task = TaskId(t);
+    for (std::size_t t = 0; t < refs_.size(); ++t) {
+      check_.tasks[t].task = TaskId(t);
+      check_.tasks[t].response.bound = bound_of(TaskId(t));
+    }
   }
 
-  AssumptionCheck run(const BoundOf &bound_of) {
-    find_late_releases();
-    check_executions();
-    std::vector<const JobRecord *> worst(refs_.size());
-    for (TaskCheck &task : check_.tasks) task.response.bound = bound_of(task.task);
-    for (const JobRecord &job : jobs_) {
-      ResponseCheck &response = check_.tasks[job.task.value].response;
-      if (job.outcome != JobOutcome::Finished || response.bound == 0 || job.response() <= response.bound) continue;
-      ++response.exceeded;
-      if (job.response() <= response.worst) continue;
-      response.worst = job.response();
-      worst[job.task.value] = &job;
+  void add(std::span<const JobEvent> events) {
+    for (const JobEvent &event : events) {
+      if (event.kind == JobEventKind::Released && event.task.value < refs_.size()) see_release(event);
+      first_.add(std::span(&event, 1));
+      first_.drain_ended([this](const JobRecord &job) { see(measured(job)); });
     }
-    for (std::size_t t = 0; t < worst.size(); ++t) {
-      if (worst[t] != nullptr) explain(*worst[t], check_.tasks[t].response);
+  }
+
+  /// Ends the first pass. Returns true if there is something to explain in a second one.
+  bool conclude() {
+    judge_waiting(kNever);
+    for (std::size_t t = 0; t < refs_.size(); ++t) {
+      ExecutionCheck &execution = check_.tasks[t].execution;
+      execution.is_exceeded = is_beyond_noise(excess_[t], execution.jobs, refs_[t].task->wcet, check_.allowed.noise);
+    }
+    return std::any_of(worst_.begin(), worst_.end(), [](const auto &worst) { return worst.has_value(); });
+  }
+
+  void explain(std::span<const JobEvent> events) {
+    second_.add(events);
+    second_.drain_ended([this](const JobRecord &ended) {
+      const JobRecord job = measured(ended);
+      for (std::size_t t = 0; t < refs_.size(); ++t) {
+        if (worst_[t]) look(job, *worst_[t], during_[t]);
+      }
+    });
+  }
+
+  AssumptionCheck take() {
+    for (std::size_t t = 0; t < refs_.size(); ++t) {
+      if (worst_[t]) explain(*worst_[t], during_[t], check_.tasks[t].response);
     }
     return std::move(check_);
   }
 
  private:
-  void check_executions() {
-    std::vector<std::vector<Duration>> excess(refs_.size());
-    for (const JobRecord &job : jobs_) {
-      const Duration wcet = refs_[job.task.value].task->wcet;
-      if (job.processor == kNever || job.outcome != JobOutcome::Finished || wcet == 0) continue;
-      ExecutionCheck &execution = check_.tasks[job.task.value].execution;
-      ++execution.jobs;
-      execution.longest = std::max(execution.longest, job.processor);
-      const Duration above = job.processor - wcet - slack_of(job, check_.allowed);
-      if (above > 0) {
-        ++execution.above;
-        if (2 * lateness_during(job) < above) excess[job.task.value].push_back(above);
-      }
-    }
-    for (std::size_t t = 0; t < refs_.size(); ++t) {
-      ExecutionCheck &execution = check_.tasks[t].execution;
-      execution.is_exceeded =
-          is_beyond_noise(std::move(excess[t]), execution.jobs, refs_[t].task->wcet, check_.allowed.noise);
-    }
+  static constexpr std::size_t kMostWaiting = std::size_t{1} << 16U;
+
+  struct LateRelease {
+    Time release = 0;  // nominal
+    Duration lateness = 0;
+  };
+  /// An execution above its wcet, of which it is open whether the machine stood still during it.
+  struct Above {
+    TaskId task;
+    Time start = 0;
+    Time finish = 0;
+    Duration excess = 0;
+  };
+  /// What happened between the release and the finish of the worst job of a task.
+  struct During {
+    Duration wcet = 0;
+    Duration late = 0;
+    Duration lost = 0;
+    std::uint64_t jobs = 0;  // whose processor time is known
+    Duration largest = 0;
+    std::uint64_t sequence = 0;  // of the job with the largest excess
+    TaskId culprit;
+    Duration used = 0;
+  };
+
+  [[nodiscard]] JobRecord measured(JobRecord job) const {
+    if (is_virtual_time_) job.processor = job.on_worker;  // nothing else runs there
+    return job;
   }
 
-  // Collects the releases that came later than the calibrated lateness.
-  void find_late_releases() {
-    for (const JobRecord &job : jobs_) {
-      const bool is_timer = refs_[job.task.value].task->activation == Activation::Timer;
-      if (!is_timer || job.seen == kNever || job.seen - job.release <= check_.allowed.lateness) continue;
-      late_.emplace_back(job.release, job.seen - job.release);
-    }
-    std::sort(late_.begin(), late_.end());
+  // A job waits for its judgement until no release during it can still be seen: the timer sees them in their order.
+  void see_release(const JobEvent &event) {
+    if (refs_[event.task.value].task->activation != Activation::Timer) return;
+    judge_waiting(event.value);
+    const Duration lateness = event.time - event.value;
+    if (lateness <= check_.allowed.lateness) return;
+    // Jobs end after the last release: of earlier ones, only later ones than all that follow can matter.
+    auto at = std::upper_bound(late_.begin(), late_.end(), event.value,
+                               [](Time release, const LateRelease &late) { return release < late.release; });
+    const auto is_later = [&](const LateRelease &late) { return late.lateness >= lateness; };
+    if (std::any_of(at, late_.end(), is_later)) return;
+    const auto first = std::find_if_not(std::make_reverse_iterator(at), late_.rend(),
+                                        [&](const LateRelease &late) { return late.lateness <= lateness; });
+    at = late_.erase(first.base(), at);
+    late_.insert(at, {event.value, lateness});
+    if (late_.size() > kMostWaiting) late_.erase(late_.begin());
+  }
+
+  void see(const JobRecord &job) {
+    if (job.outcome != JobOutcome::Finished) return;
+    see_execution(job);
+    ResponseCheck &response = check_.tasks[job.task.value].response;
+    if (response.bound == 0 || job.response() <= response.bound) return;
+    ++response.exceeded;
+    std::optional<JobRecord> &worst = worst_[job.task.value];
+    const bool is_first_of_equals =
+        worst && job.response() == response.worst && job.sequence < worst->sequence;  // they need not end in order
+    if (job.response() <= response.worst && !is_first_of_equals) return;
+    response.worst = job.response();
+    worst = job;
+  }
+
+  void see_execution(const JobRecord &job) {
+    const Duration wcet = refs_[job.task.value].task->wcet;
+    if (job.processor == kNever || wcet == 0) return;
+    ExecutionCheck &execution = check_.tasks[job.task.value].execution;
+    ++execution.jobs;
+    execution.longest = std::max(execution.longest, job.processor);
+    const Duration above = job.processor - wcet - slack_of(job, check_.allowed);
+    if (above <= 0) return;
+    ++execution.above;
+    waiting_.push_back({job.task, job.start, job.finish, above});
+    if (waiting_.size() >= kMostWaiting) judge_waiting(kNever);
+  }
+
+  // Judges the executions that ended before `release`.
+  void judge_waiting(Time release) {
+    if (waiting_.empty()) return;
+    std::erase_if(waiting_, [&](const Above &above) {
+      if (above.finish >= release) return false;
+      if (2 * lateness_during(above) < above.excess) excess_[above.task.value].add(above.excess);
+      return true;
+    });
   }
 
   // Returns how late the release timer was while the job ran. No job delays the timer. If it was late by most of the
   // job's excess, the machine stood still, and the kernel charged that time to the job.
-  [[nodiscard]] Duration lateness_during(const JobRecord &job) const {
+  [[nodiscard]] Duration lateness_during(const Above &job) const {
     Duration latest = 0;
-    auto late = std::lower_bound(late_.begin(), late_.end(), std::pair(job.start, Duration{0}));
-    for (; late != late_.end() && late->first <= job.finish; ++late) latest = std::max(latest, late->second);
+    auto late = std::lower_bound(late_.begin(), late_.end(), job.start,
+                                 [](const LateRelease &one, Time start) { return one.release < start; });
+    for (; late != late_.end() && late->release <= job.finish; ++late) latest = std::max(latest, late->lateness);
     return latest;
   }
 
-  // Compares what happened between the job's release and its finish with what was charged, and names the largest
-  // excess.
-  void explain(const JobRecord &worst, ResponseCheck &response) const {
+  // Adds what a job did between the release and the finish of another one.
+  void look(const JobRecord &job, const JobRecord &worst, During &during) const {
+    if (!job.has_started() || job.finish == kNever || job.finish <= worst.release || job.start >= worst.finish) return;
+    if (job.release >= worst.release) during.late = std::max(during.late, job.seen - job.release);
+    if (job.processor == kNever) return;
+    const Duration within = std::min(job.finish, worst.finish) - std::max(job.start, worst.release);
+    during.lost += std::clamp<Duration>(job.on_worker - job.processor, 0, within);
+    ++during.jobs;
+    const Duration above = job.processor - refs_[job.task.value].task->wcet;
+    if (above <= 0 || !check_.tasks[job.task.value].execution.is_exceeded) return;
+    during.wcet += above;
+    const bool is_first_of_equals = above == during.largest && job.sequence < during.sequence;
+    if (above <= during.largest && !is_first_of_equals) return;
+    during.largest = above;
+    during.sequence = job.sequence;
+    during.culprit = job.task;
+    during.used = job.processor;
+  }
+
+  // Compares what happened with what was charged, and names the largest excess.
+  void explain(const JobRecord &worst, const During &during, ResponseCheck &response) const {
     const Overheads charged = calibrated_.value_or(Overheads());
-    Duration wcet = 0;
-    Duration late = 0;
-    Duration lost = 0;
-    Duration granted = workers_ * charged.stall.in(worst.response());
-    Duration largest = 0;
-    TaskId culprit;
-    Duration used = 0;
-    for (const JobRecord &job : jobs_) {
-      if (!job.has_started() || job.finish == kNever || job.finish <= worst.release || job.start >= worst.finish) {
-        continue;
-      }
-      if (job.release >= worst.release || &job == &worst) late = std::max(late, job.seen - job.release);
-      if (job.processor == kNever) continue;
-      const Duration within = std::min(job.finish, worst.finish) - std::max(job.start, worst.release);
-      lost += std::clamp<Duration>(job.on_worker - job.processor, 0, within);
-      granted += charged.dispatch + charged.preempt + charged.timer;
-      const Duration above = job.processor - refs_[job.task.value].task->wcet;
-      if (above <= 0 || !check_.tasks[job.task.value].execution.is_exceeded) continue;
-      wcet += above;
-      if (above <= largest) continue;
-      largest = above;
-      culprit = job.task;
-      used = job.processor;
-    }
-    const Duration release_excess = late - charged.lateness;
-    const Duration platform_excess = lost - granted;
-    const Duration most = std::max({wcet, release_excess, platform_excess});
-    if (most > 0 && most == wcet) {
+    const Duration granted = Duration{check_.workers} * charged.stall.in(worst.response()) +
+                             static_cast<Duration>(during.jobs) * (charged.dispatch + charged.preempt + charged.timer);
+    const Duration release_excess = during.late - charged.lateness;
+    const Duration platform_excess = during.lost - granted;
+    const Duration most = std::max({during.wcet, release_excess, platform_excess});
+    if (most > 0 && most == during.wcet) {
       response.broken = Broken::Wcet;
-      response.task = culprit;
-      response.amount = used;
+      response.task = during.culprit;
+      response.amount = during.used;
     } else if (most > 0) {
       response.broken = most == release_excess ? Broken::Release : Broken::Platform;
-      response.amount = most == release_excess ? late : lost;
+      response.amount = most == release_excess ? during.late : during.lost;
     }
     response.is_alarm =
         response.broken == Broken::Wcet || response.worst > response.bound + check_.unalarming(response.worst);
   }
 
   std::vector<TaskRef> refs_;
-  Duration workers_;
   std::optional<Overheads> calibrated_;
-  std::span<const JobRecord> jobs_;
-  std::vector<std::pair<Time, Duration>> late_;  // nominal release and lateness, ordered by release
+  bool is_virtual_time_;
+  JobFolder first_;
+  JobFolder second_;
+  std::vector<LateRelease> late_;                // in order of release, with decreasing lateness
+  std::vector<Above> waiting_;                   // executions that are not judged yet
+  std::vector<DurationSketch> excess_;           // by TaskId, of executions above the wcet
+  std::vector<std::optional<JobRecord>> worst_;  // by TaskId, of responses above the bound
+  std::vector<During> during_;                   // by TaskId
   AssumptionCheck check_;
 };
 
@@ -230,12 +316,14 @@ void AssumptionCheck::add(const AssumptionCheck &other) {
   }
 }
 
-bool is_beyond_noise(std::vector<Duration> excess, std::uint64_t jobs, Duration wcet, const Loss &noise) {
-  if (excess.empty()) return false;
-  std::sort(excess.begin(), excess.end(), std::greater<>());
-  if (excess.front() > most_noise(wcet, noise)) return true;
-  for (std::size_t i = 0; i < excess.size(); ++i) {
-    if (is_too_often(i + 1, jobs, excess[i], wcet, noise)) return true;
+bool is_beyond_noise(const DurationSketch &excess, std::uint64_t jobs, Duration wcet, const Loss &noise) {
+  const std::vector<CountedDurations> all = excess.counted();
+  if (all.empty()) return false;
+  if (all.back().high > most_noise(wcet, noise)) return true;
+  std::uint64_t count = 0;
+  for (auto each = all.rbegin(); each != all.rend(); ++each) {
+    count += each->count;
+    if (is_too_often(count, jobs, each->low, wcet, noise)) return true;
   }
   return false;
 }
@@ -253,19 +341,20 @@ bool is_beyond_noise(const ExecutionPercentiles &executions, Duration wcet,
   return has_excess(executions.p50, executions.jobs / 2) || has_excess(executions.p99, executions.jobs / 100);
 }
 
-AssumptionCheck check_assumptions(const Workload &workload, std::uint32_t workers,
-                                  const std::optional<Overheads> &calibrated, std::span<const JobRecord> jobs,
-                                  const BoundOf &bound_of) {
-  return Checker(workload, workers, calibrated, jobs).run(bound_of);
+Result<AssumptionCheck> check_assumptions(const trace::Recording &run, const BoundOf &bound_of) {
+  AssumptionWatch watch(run.info(), bound_of);
+  Result<void> read = run.visit([&](std::span<const JobEvent> events) { watch.add(events); });
+  if (read && watch.conclude()) read = run.visit([&](std::span<const JobEvent> events) { watch.explain(events); });
+  if (!read) return tl::unexpected<Diagnostics>(std::move(read.error()));
+  return watch.take();
 }
 
 AssumptionCheck check_assumptions(const trace::RunInfo &run, std::span<const JobEvent> events,
                                   const BoundOf &bound_of) {
-  std::vector<JobRecord> jobs = fold_jobs(run.workload, events);
-  if (run.driver == trace::Driver::Simulator) {
-    for (JobRecord &job : jobs) job.processor = job.on_worker;  // nothing else runs there
-  }
-  return check_assumptions(run.workload, run.config.workers, parse_overheads(run.overheads), jobs, bound_of);
+  AssumptionWatch watch(run, bound_of);
+  watch.add(events);
+  if (watch.conclude()) watch.explain(events);
+  return watch.take();
 }
 
 std::vector<Remark> remarks(const AssumptionCheck &check, const Workload &workload) {

@@ -3,7 +3,7 @@
 
 // Checks what a bound assumes of a run on threads: executions within the wcet (as processor time), releases on time,
 // and a platform that takes no more than was charged. Only this file decides what is an alarm and what is the noise of
-// the machine. Pure functions.
+// the machine. Pure but for the file of a run.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +14,9 @@
 #include <vector>
 
 #include "redag/model/overheads.hpp"
+#include "redag/trace/recording.hpp"
 #include "redag/trace/trace.hpp"
-#include "redag_analysis/metrics/jobs.hpp"
+#include "redag_analysis/metrics/duration_sketch.hpp"
 
 namespace redag::metrics {
 
@@ -72,15 +73,13 @@ using BoundOf = std::function<Duration(TaskId)>;
 [[nodiscard]] AssumptionCheck check_assumptions(const trace::RunInfo &run, std::span<const JobEvent> events,
                                                 const BoundOf &bound_of);
 
-/// The same check for callers that have its inputs separately.
-[[nodiscard]] AssumptionCheck check_assumptions(const Workload &workload, std::uint32_t workers,
-                                                const std::optional<Overheads> &calibrated,
-                                                std::span<const JobRecord> jobs, const BoundOf &bound_of);
+/// The same in two passes over a recorded run, in memory that does not grow with it. Error: a damaged file.
+[[nodiscard]] Result<AssumptionCheck> check_assumptions(const trace::Recording &run, const BoundOf &bound_of);
 
 /// True if `excess` is more than a machine with this noise explains. `excess` holds the times above the wcet among
 /// `jobs` executions. By Markov's inequality, at most a share E/x of all executions meets noise of x or more, where E
 /// is the noise expected in one.
-[[nodiscard]] bool is_beyond_noise(std::vector<Duration> excess, std::uint64_t jobs, Duration wcet, const Loss &noise);
+[[nodiscard]] bool is_beyond_noise(const DurationSketch &excess, std::uint64_t jobs, Duration wcet, const Loss &noise);
 
 /// What a Histogram knows of a task's executions, as processor time.
 struct ExecutionPercentiles {

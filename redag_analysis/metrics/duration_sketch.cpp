@@ -52,6 +52,30 @@ Distribution DurationSketch::distribution() const {
   return result;
 }
 
+std::vector<CountedDurations> DurationSketch::counted() const {
+  std::vector<CountedDurations> all;
+  if (is_exact()) {
+    std::vector<Duration> sorted = values_;
+    std::sort(sorted.begin(), sorted.end());
+    for (const Duration value : sorted) {
+      if (all.empty() || all.back().high != value) all.push_back({value, value, 0});
+      ++all.back().count;
+    }
+    return all;
+  }
+  for (const Page &page : pages_) {
+    for (std::size_t i = 0; i < kPageSize; ++i) {
+      if (page.counts[i] == 0) continue;
+      all.push_back({static_cast<Duration>(Buckets::lowest_in(page.first + i)),
+                     static_cast<Duration>(Buckets::highest_in(page.first + i)), page.counts[i]});
+    }
+  }
+  // The extremes are known exactly.
+  all.front().low = std::min(min_, all.front().high);
+  all.back().high = max_;
+  return all;
+}
+
 std::size_t DurationSketch::memory() const {
   return values_.capacity() * sizeof(Duration) + pages_.capacity() * sizeof(Page);
 }

@@ -19,6 +19,15 @@
 
 namespace redag::metrics {
 
+/// So many durations from `low` to `high`.
+struct CountedDurations {
+  Duration low = 0;
+  Duration high = 0;
+  std::uint64_t count = 0;
+
+  friend bool operator==(const CountedDurations &, const CountedDurations &) = default;
+};
+
 class DurationSketch {
  public:
   using Buckets = LogBuckets<7>;
@@ -35,6 +44,9 @@ class DurationSketch {
   void merge(const DurationSketch &other);
 
   [[nodiscard]] Distribution distribution() const;
+  /// All values, in ascending ranges that do not overlap: equal values of an exact sketch, else those of a bucket.
+  [[nodiscard]] std::vector<CountedDurations> counted() const;
+  [[nodiscard]] std::uint64_t size() const { return is_exact() ? values_.size() : count_; }
   [[nodiscard]] bool is_exact() const { return pages_.empty(); }
   /// Heap memory in bytes.
   [[nodiscard]] std::size_t memory() const;

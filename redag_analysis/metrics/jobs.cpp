@@ -74,23 +74,17 @@ void JobFolder::add(const JobEvent &event) {
       if (!record.has_started()) record.start = event.time;
       record.worker = event.worker;
       record.deadline = event.value;
-      found->on_worker_since = event.time;
       found->stay.move(Stay::OnWorker, event.time);
       break;
     case JobEventKind::Started: record.start = event.value; break;  // exact, even if the event was delivered late
     case JobEventKind::Preempted:
       ++record.preemptions;
-      leave_worker(*found, Stay::Preempted, event.time);
+      found->stay.move(Stay::Preempted, event.time);
       break;
-    case JobEventKind::Waits:
-      leave_worker(*found, event.value < 0 ? Stay::Waits : Stay::DeviceQueue, event.time);
-      break;
+    case JobEventKind::Waits: found->stay.move(event.value < 0 ? Stay::Waits : Stay::DeviceQueue, event.time); break;
     case JobEventKind::Served: found->stay.move(Stay::Device, event.time); break;
     case JobEventKind::Woken: found->stay.move(Stay::Ready, event.time); break;
-    case JobEventKind::Resumed:
-      found->on_worker_since = event.time;
-      found->stay.move(Stay::OnWorker, event.time);
-      break;
+    case JobEventKind::Resumed: found->stay.move(Stay::OnWorker, event.time); break;
     case JobEventKind::Executed: record.processor = event.value; break;
     case JobEventKind::Exceeded: record.exceeded = true; break;
     case JobEventKind::HighMode:
@@ -101,10 +95,11 @@ void JobFolder::add(const JobEvent &event) {
   }
 }
 
-void JobFolder::leave_worker(Live &job, Stay stay, Time now) {
-  if (job.on_worker_since != kNever) job.record.on_worker += now - job.on_worker_since;
-  job.on_worker_since = kNever;
-  job.stay.move(stay, now);
+JobRecord JobFolder::Live::timed() const {
+  JobRecord timed = record;
+  timed.split = stay.split();
+  timed.on_worker = timed.split[Stay::OnWorker];
+  return timed;
 }
 
 void JobFolder::end(TaskJobs &task, std::size_t index, const JobEvent &event) {
@@ -115,12 +110,10 @@ void JobFolder::end(TaskJobs &task, std::size_t index, const JobEvent &event) {
   } else {
     job.record.outcome = event.kind == JobEventKind::Finished ? JobOutcome::Finished : JobOutcome::Aborted;
     job.record.finish = event.value;
-    if (job.on_worker_since != kNever) job.record.on_worker += event.value - job.on_worker_since;
   }
   job.record.reason = event.reason;
   job.stay.end(job.record.finish);
-  job.record.split = job.stay.split();
-  ended_.push_back(job.record);
+  ended_.push_back(job.timed());
   task.live.erase(task.live.begin() + static_cast<std::ptrdiff_t>(index));
 }
 
@@ -129,10 +122,7 @@ std::vector<JobRecord> JobFolder::take_ended() { return std::exchange(ended_, {}
 std::vector<JobRecord> JobFolder::in_flight() const {
   std::vector<JobRecord> records;
   for (const TaskJobs &task : tasks_) {
-    for (const Live &job : task.live) {
-      records.push_back(job.record);
-      records.back().split = job.stay.split();
-    }
+    for (const Live &job : task.live) records.push_back(job.timed());
   }
   std::sort(records.begin(), records.end(), released_earlier);
   return records;

@@ -78,8 +78,10 @@ class JobFolder {
  private:
   struct Live {
     JobRecord record;
-    Time on_worker_since = kNever;
     StayClock stay;
+
+    /// The record, with the times that the clock has counted.
+    [[nodiscard]] JobRecord timed() const;
   };
   struct TaskJobs {
     Duration deadline = 0;
@@ -87,7 +89,6 @@ class JobFolder {
   };
 
   void add(const JobEvent &event);
-  static void leave_worker(Live &job, Stay stay, Time now);
   void end(TaskJobs &task, std::size_t index, const JobEvent &event);
 
   std::vector<TaskJobs> tasks_;

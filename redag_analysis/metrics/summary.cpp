@@ -13,11 +13,6 @@ double ratio(std::uint64_t part, std::uint64_t whole) {
   return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
 }
 
-std::size_t exact_jobs_of(std::size_t tasks) {
-  constexpr std::size_t kLeast = 16;  // below this, exact values are cheaper than a sketch
-  return std::max(kLeast, kExactJobs / std::max<std::size_t>(1, tasks));
-}
-
 // Returns, by task of a DAG, how many of its jobs the releases of its sources ask for. A timer is released by itself. A
 // data task is released once all its predecessors have ended: at most as often as the rarest of them.
 std::vector<std::uint64_t> answers_due(const Dag &dag, std::span<const JobStats> stats) {
@@ -95,11 +90,15 @@ std::uint64_t EndToEnd::due() const {
   return all;
 }
 
-Summarizer::Summarizer(const trace::RunInfo &run)
+std::size_t exact_jobs_of_task(std::size_t tasks, std::size_t exact_jobs) {
+  return std::max<std::size_t>(16, exact_jobs / std::max<std::size_t>(1, tasks));
+}
+
+Summarizer::Summarizer(const trace::RunInfo &run, std::size_t exact_jobs)
     : run_(run),
       begin_(run.start + run.warm_up),
       refs_(flatten(run.workload)),
-      exact_(exact_jobs_of(refs_.size())),
+      exact_(exact_jobs_of_task(refs_.size(), exact_jobs)),
       is_sink_(sinks_of(run.workload)),
       end_to_end_deadlines_(end_to_end_deadlines(run.workload)),
       stats_(refs_.size()),
@@ -113,7 +112,7 @@ Summarizer::Summarizer(const trace::RunInfo &run)
 void Summarizer::add(std::span<const JobEvent> events) {
   activity_.add(events);
   folder_.add(events);
-  for (const JobRecord &job : folder_.take_ended()) count(job, job.finish);
+  folder_.drain_ended([this](const JobRecord &job) { count(job, job.finish); });
 }
 
 void Summarizer::count(const JobRecord &job, Time end) {

@@ -25,6 +25,9 @@ namespace redag::metrics {
 /// The number of jobs, over all tasks, whose times are kept for exact percentiles, 32 bytes each.
 inline constexpr std::size_t kExactJobs = std::size_t{1} << 20U;
 
+/// Its share of one of so many tasks: at least 16, below which exact values are cheaper than a sketch.
+[[nodiscard]] std::size_t exact_jobs_of_task(std::size_t tasks, std::size_t exact_jobs = kExactJobs);
+
 inline constexpr std::size_t kReasonCount = static_cast<std::size_t>(kLastReason) + 1;
 
 /// Counts the jobs of a task, of a DAG, or of all. Jobs released before the end of the warm-up are not included. The
@@ -124,7 +127,7 @@ struct Summary {
 class Summarizer {
  public:
   /// `run` must outlive this object; its `end` is not used.
-  explicit Summarizer(const trace::RunInfo &run);
+  explicit Summarizer(const trace::RunInfo &run, std::size_t exact_jobs = kExactJobs);
 
   void add(std::span<const JobEvent> events);
   /// Ends the run at `end`. Call once.

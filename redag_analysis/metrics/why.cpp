@@ -7,42 +7,52 @@
 #include <map>
 #include <numeric>
 #include <tuple>
+#include <unordered_map>
+#include <unordered_set>
 #include <utility>
 
 #include "redag_analysis/metrics/miss.hpp"
+#include "redag_analysis/metrics/why_links.hpp"
 #include "redag_analysis/metrics/why_path.hpp"
+#include "redag_analysis/metrics/why_waits.hpp"
 
 namespace redag::metrics {
 namespace {
 
-// The jobs that an explanation of `subjects` can reach.
-std::vector<bool> reachable(const JobLinks &links, std::span<const Subject> subjects) {
-  std::vector<bool> chosen(links.jobs().size(), false);
-  std::vector<std::size_t> next;
-  for (const Subject &subject : subjects) next.push_back(subject.job);
-  while (!next.empty()) {
-    const std::size_t job = next.back();
-    next.pop_back();
-    if (job == JobLinks::kNone || chosen[job]) continue;
-    chosen[job] = true;
-    next.push_back(links.last(job));
-    next.push_back(links.oldest(job));
+std::uint64_t key_of(const JobId &job) { return (std::uint64_t{job.task.value} << 32U) | job.number; }
+
+// When a job ended; the end of the run for a job in flight.
+Time end_of(const JobRecord &job, Time run_end) {
+  return job.outcome == JobOutcome::InFlight ? std::max(run_end, job.seen) : job.finish;
+}
+
+// Jobs to explain that have ended, until the jobs that their explanations can reach are complete as well.
+class WaitingSubjects {
+ public:
+  explicit WaitingSubjects(std::span<const Subject> subjects) {
+    for (std::size_t i = 0; i < subjects.size(); ++i) wanted_.emplace(key_of(subjects[i].job), i);
   }
-  return chosen;
-}
 
-struct Ranked {
-  double share = 0;  // of the deadline
-  Subject subject;
+  /// Takes the jobs that have ended, and passes those subjects on to take(JobHandle, index) that are complete.
+  template <class IsComplete, class Take>
+  void settle(JobLinks &links, IsComplete is_complete, Take take) {
+    links.drain_ended([this](const JobHandle &job) {
+      const auto wanted = wanted_.find(key_of(job->id()));
+      if (wanted == wanted_.end()) return;
+      waiting_.emplace_back(job, wanted->second);
+      wanted_.erase(wanted);
+    });
+    std::erase_if(waiting_, [&](const auto &one) {
+      const bool is_over = visit_reachable(one.first, is_complete);
+      if (is_over) take(one.first, one.second);
+      return is_over;
+    });
+  }
+
+ private:
+  std::unordered_map<std::uint64_t, std::size_t> wanted_;  // by job
+  std::vector<std::pair<JobHandle, std::size_t>> waiting_;
 };
-
-std::vector<Subject> in_order(std::vector<Ranked> ranked) {
-  std::stable_sort(ranked.begin(), ranked.end(), [](const Ranked &a, const Ranked &b) { return a.share > b.share; });
-  std::vector<Subject> subjects;
-  subjects.reserve(ranked.size());
-  for (const Ranked &one : ranked) subjects.push_back(one.subject);
-  return subjects;
-}
 
 using CulpritKey = std::tuple<Cause, TaskId, std::string>;
 
@@ -70,91 +80,250 @@ std::vector<Culprit> sorted(std::map<CulpritKey, Culprit> found) {
 
 }  // namespace
 
-Investigation::Investigation(const trace::Trace &trace, const KernelRecord *kernel)
-    : trace_(trace), links_(trace), end_to_end_(end_to_end_deadlines(trace.info.workload)) {
+bool Investigation::is_worse(const Ranked &a, const Ranked &b) {
+  return a.share != b.share ? a.share > b.share : a.sequence < b.sequence;
+}
+
+// Looks at all jobs once, and remembers the worst.
+class Investigation::Surveyor {
+ public:
+  Surveyor(const Investigation &of, std::size_t most)
+      : of_(of), info_(of.run()), folder_(info_.workload), late_(most), lost_(most) {
+    survey_.tasks.resize(info_.workload.task_count());
+  }
+
+  void add(std::span<const JobEvent> events) {
+    folder_.add(events);
+    folder_.drain_ended([this](const JobRecord &job) { see(job); });
+  }
+
+  Survey finish() {
+    for (const JobRecord &job : folder_.in_flight()) see(job);
+    survey_.misses = late_.take();
+    const std::vector<Subject> lost = lost_.take();
+    const std::size_t room = late_.most() - survey_.misses.size();
+    survey_.misses.insert(survey_.misses.end(), lost.begin(),
+                          lost.begin() + static_cast<std::ptrdiff_t>(std::min(room, lost.size())));
+    return std::move(survey_);
+  }
+
+ private:
+  // The worst of any number. Keeps up to twice as many, so that it seldom has to choose.
+  class Worst {
+   public:
+    explicit Worst(std::size_t most) : most_(most) {}
+
+    [[nodiscard]] std::size_t most() const { return most_; }
+    void add(const Ranked &one) {
+      if (ranked_.size() / 2 >= std::max<std::size_t>(most_, 1)) cut();
+      ranked_.push_back(one);
+    }
+    [[nodiscard]] std::vector<Subject> take() {
+      cut();
+      std::sort(ranked_.begin(), ranked_.end(), is_worse);
+      std::vector<Subject> subjects;
+      subjects.reserve(ranked_.size());
+      for (const Ranked &one : ranked_) subjects.push_back(one.subject);
+      return subjects;
+    }
+
+   private:
+    void cut() {
+      if (ranked_.size() <= most_) return;
+      const auto end = ranked_.begin() + static_cast<std::ptrdiff_t>(most_);
+      std::nth_element(ranked_.begin(), end, ranked_.end(), is_worse);
+      ranked_.erase(end, ranked_.end());
+    }
+
+    std::size_t most_;
+    std::vector<Ranked> ranked_;
+  };
+
+  void see(const JobRecord &job) {
+    WorstOfTask &task = survey_.tasks[job.task.value];
+    task.last_number = std::max(task.last_number, job.number);
+    if (job.release < info_.start + info_.warm_up) return;
+    ++survey_.counted;
+    const Miss miss = of_.miss_of(job);
+    const bool end_to_end = miss == Miss::EndToEnd;
+    if (miss != Miss::None) ++survey_.missed;
+    if (miss == Miss::Lost) {
+      const Ranked one{0, job.sequence, {id_of(job), false}};
+      lost_.add(one);
+      keep_worst(task.lost, one);
+    } else if (miss != Miss::None) {
+      const Ranked one{closeness(job, end_to_end), job.sequence, {id_of(job), end_to_end}};
+      late_.add(one);
+      keep_worst(task.late, one);
+    }
+    if (job.outcome == JobOutcome::Finished) {
+      keep_worst(task.closest, {closeness(job, false), job.sequence, {id_of(job), false}});
+    }
+  }
+
+  static JobId id_of(const JobRecord &job) { return {job.task, job.number}; }
+
+  static void keep_worst(std::optional<Ranked> &worst, const Ranked &one) {
+    if (!worst || is_worse(one, *worst)) worst = one;
+  }
+
+  [[nodiscard]] double closeness(const JobRecord &job, bool end_to_end) const {
+    const Time begin = end_to_end ? job.origin : job.release;
+    const Duration deadline = end_to_end ? of_.end_to_end_[job.task.value] : job.deadline - job.release;
+    return static_cast<double>(end_of(job, info_.end) - begin) / static_cast<double>(std::max<Duration>(1, deadline));
+  }
+
+  const Investigation &of_;
+  const trace::RunInfo &info_;
+  JobFolder folder_;
+  Worst late_;
+  Worst lost_;
+  Survey survey_;
+};
+
+// Explains subjects: the first pass finds the jobs that their explanations can reach, the second one follows these.
+class Investigation::Explainer {
+ public:
+  Explainer(const Investigation &of, std::span<const Subject> subjects, const Visit &visit)
+      : of_(of), subjects_(subjects), visit_(visit) {}
+
+  Result<void> run() {
+    if (Result<void> chosen = choose(); !chosen) return chosen;
+    return follow();
+  }
+
+ private:
+  Result<void> choose() {
+    WaitingSubjects waiting(subjects_);
+    JobLinks links(of_.run());
+    const auto settle = [&] {
+      waiting.settle(
+          links, [](const JobHandle &job) { return job->has_ended; },
+          [this](const JobHandle &subject, std::size_t /*index*/) {
+            visit_reachable(subject, [this](const JobHandle &job) {
+              chosen_.insert(key_of(job->id()));
+              return true;
+            });
+          });
+    };
+    Result<void> read = of_.run_.visit([&](std::span<const JobEvent> events) {
+      for (const JobEvent &event : events) links.add(event);
+      settle();
+    });
+    links.finish();
+    settle();
+    return read;
+  }
+
+  Result<void> follow() {
+    WaitingSubjects waiting(subjects_);
+    JobLinks links(of_.run());
+    WaitWatch watch(of_.run(), [this](const JobId &job) { return chosen_.contains(key_of(job)); });
+    const auto settle = [&] {
+      waiting.settle(
+          links, [](const JobHandle &job) { return job->has_ended && has_known_holders(*job); },
+          [&](const JobHandle &subject, std::size_t index) {
+            visit_reachable(subject, [](const JobHandle &job) {
+              name_holders(*job);
+              return true;
+            });
+            visit_(index, explain(*subject, subjects_[index].end_to_end, links));
+          });
+    };
+    Result<void> read = of_.run_.visit([&](std::span<const JobEvent> events) {
+      for (const JobEvent &event : events) watch.add(event, links);
+      settle();
+    });
+    watch.finish(links);
+    settle();
+    return read;
+  }
+
+  [[nodiscard]] Explanation explain(const LinkedJob &job, bool end_to_end, const JobLinks &links) const {
+    Explanation one;
+    one.job = job.record;
+    one.miss = of_.miss_of(job.record);
+    one.end_to_end = end_to_end && job.record.origin != kNever;
+    one.begin = one.end_to_end ? job.record.origin : job.record.release;
+    one.end = std::max(one.begin, links.end_of(job));
+    one.deadline = one.end_to_end ? of_.end_to_end_[job.record.task.value] : job.record.deadline - job.record.release;
+    one.parts = WhyPath(of_.run(), links, of_.kernel_ ? &*of_.kernel_ : nullptr)
+                    .parts_of(job, one.begin, one.end, one.end_to_end);
+    return one;
+  }
+
+  const Investigation &of_;
+  std::span<const Subject> subjects_;
+  const Visit &visit_;
+  std::unordered_set<std::uint64_t> chosen_;
+};
+
+Investigation::Investigation(const trace::Recording &run, const KernelRecord *kernel)
+    : run_(run), end_to_end_(end_to_end_deadlines(run.info().workload)) {
   if (kernel != nullptr) kernel_.emplace(*kernel);
 }
 
-Miss Investigation::miss(std::size_t job) const {
-  return miss_of(jobs()[job], trace_.info.end, end_to_end_[jobs()[job].task.value]);
+Result<Investigation> Investigation::of(const trace::Recording &run, const KernelRecord *kernel, std::size_t most) {
+  Investigation made(run, kernel);
+  Surveyor surveyor(made, most);
+  const Result<void> read = run.visit([&](std::span<const JobEvent> events) { surveyor.add(events); });
+  if (!read) return tl::unexpected<Diagnostics>(read.error());
+  made.survey_ = surveyor.finish();
+  return made;
 }
 
-std::optional<std::size_t> Investigation::find(const JobId &job) const {
-  const std::size_t index = links_.find(job);
-  return index == JobLinks::kNone ? std::nullopt : std::optional(index);
-}
-
-bool Investigation::counts(std::size_t job) const {
-  return jobs()[job].release >= trace_.info.start + trace_.info.warm_up;
-}
-
-std::size_t Investigation::counted() const {
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < jobs().size(); ++i) count += counts(i) ? 1U : 0U;
-  return count;
-}
-
-Subject Investigation::subject_of(std::size_t job) const { return {job, miss(job) == Miss::EndToEnd}; }
-
-double Investigation::closeness(const Subject &subject) const {
-  const JobRecord &job = jobs()[subject.job];
-  const Time begin = subject.end_to_end ? job.origin : job.release;
-  const Duration deadline = std::max<Duration>(1, deadline_of(subject));
-  return static_cast<double>(links_.end_of(subject.job) - begin) / static_cast<double>(deadline);
-}
-
-Duration Investigation::deadline_of(const Subject &subject) const {
-  const JobRecord &job = jobs()[subject.job];
-  return subject.end_to_end ? end_to_end_[job.task.value] : job.deadline - job.release;
-}
-
-std::vector<Subject> Investigation::misses() const {
-  std::vector<Ranked> late;
-  std::vector<Subject> lost;
-  for (std::size_t i = 0; i < jobs().size(); ++i) {
-    if (!counts(i)) continue;
-    const Miss kind = miss(i);
-    if (kind == Miss::Lost) lost.push_back({i, false});
-    if (kind == Miss::Deadline || kind == Miss::EndToEnd) late.push_back({closeness(subject_of(i)), subject_of(i)});
-  }
-  std::vector<Subject> all = in_order(std::move(late));
-  all.insert(all.end(), lost.begin(), lost.end());
-  return all;
+Miss Investigation::miss_of(const JobRecord &job) const {
+  return metrics::miss_of(job, run().end, end_to_end_[job.task.value]);
 }
 
 std::vector<Subject> Investigation::closest(std::size_t most) const {
-  std::map<TaskId, Ranked> worst;
-  for (std::size_t i = 0; i < jobs().size(); ++i) {
-    const JobRecord &job = jobs()[i];
-    if (job.outcome != JobOutcome::Finished || !counts(i)) continue;
-    const Ranked one{closeness({i, false}), {i, false}};
-    const auto [of_task, is_new] = worst.try_emplace(job.task, one);
-    if (!is_new && one.share > of_task->second.share) of_task->second = one;
-  }
   std::vector<Ranked> ranked;
-  for (const auto &[task, one] : worst) ranked.push_back(one);
-  std::vector<Subject> all = in_order(std::move(ranked));
-  all.resize(std::min(all.size(), most));
-  return all;
+  for (const WorstOfTask &task : survey_.tasks) {
+    if (task.closest) ranked.push_back(*task.closest);
+  }
+  // Of equal ones that of the first task comes first.
+  std::stable_sort(ranked.begin(), ranked.end(), [](const Ranked &a, const Ranked &b) { return a.share > b.share; });
+  ranked.resize(std::min(ranked.size(), most));
+  std::vector<Subject> subjects;
+  subjects.reserve(ranked.size());
+  for (const Ranked &one : ranked) subjects.push_back(one.subject);
+  return subjects;
 }
 
-std::vector<Explanation> Investigation::explain(std::span<const Subject> subjects) const {
-  const std::vector<std::vector<Wait>> waits = waits_of(trace_, links_, reachable(links_, subjects));
-  std::vector<Explanation> explanations;
-  explanations.reserve(subjects.size());
-  for (const Subject &subject : subjects) {
-    Explanation one;
-    one.job = jobs()[subject.job];
-    one.miss = miss(subject.job);
-    one.end_to_end = subject.end_to_end && one.job.origin != kNever;
-    one.begin = one.end_to_end ? one.job.origin : one.job.release;
-    one.end = std::max(one.begin, links_.end_of(subject.job));
-    one.deadline = deadline_of({subject.job, one.end_to_end});
-    one.parts = WhyPath(trace_.info, links_, waits, kernel_ ? &*kernel_ : nullptr)
-                    .parts_of(subject.job, one.begin, one.end, one.end_to_end);
-    explanations.push_back(std::move(one));
+std::optional<Subject> Investigation::worst_of(TaskId task) const {
+  const WorstOfTask &worst = survey_.tasks[task.value];
+  for (const std::optional<Ranked> &one : {worst.late, worst.lost, worst.closest}) {
+    if (one) return one->subject;
   }
-  return explanations;
+  return std::nullopt;
+}
+
+Result<std::optional<Subject>> Investigation::find(const JobId &job) const {
+  std::optional<Subject> found;
+  const auto see = [&](const JobRecord &one) {
+    if (!found && one.task == job.task && one.number == job.number) {
+      found = Subject{job, miss_of(one) == Miss::EndToEnd};
+    }
+  };
+  JobFolder folder(run().workload);
+  const Result<void> read = run_.visit([&](std::span<const JobEvent> events) {
+    folder.add(events);
+    folder.drain_ended(see);
+  });
+  if (!read) return tl::unexpected<Diagnostics>(read.error());
+  for (const JobRecord &one : folder.in_flight()) see(one);
+  return found;
+}
+
+Result<void> Investigation::explain(std::span<const Subject> subjects, const Visit &visit) const {
+  return Explainer(*this, subjects, visit).run();
+}
+
+Result<std::vector<Explanation>> Investigation::explain(std::span<const Subject> subjects) const {
+  std::vector<Explanation> all(subjects.size());
+  const Result<void> read = explain(subjects, [&](std::size_t index, Explanation one) { all[index] = std::move(one); });
+  if (!read) return tl::unexpected<Diagnostics>(read.error());
+  return all;
 }
 
 Duration PartRow::length() const {
@@ -200,18 +369,16 @@ std::vector<Culprit> culprits_of(std::span<const Part> parts) {
   return culprits;
 }
 
-std::vector<Culprit> culprits_of(std::span<const Explanation> explanations) {
-  std::map<CulpritKey, Culprit> found;
-  for (const Explanation &explanation : explanations) {
-    for (const Culprit &one : culprits_of(explanation.parts)) {
-      Culprit &culprit = found[{one.cause, one.task, one.program}];
-      std::tie(culprit.cause, culprit.task, culprit.program) = std::tie(one.cause, one.task, one.program);
-      culprit.jobs += one.jobs;
-      culprit.main += one.main;
-      culprit.time += one.time;
-    }
+void CulpritCount::add(const Explanation &explanation) {
+  for (const Culprit &one : culprits_of(explanation.parts)) {
+    Culprit &culprit = found_[{one.cause, one.task, one.program}];
+    std::tie(culprit.cause, culprit.task, culprit.program) = std::tie(one.cause, one.task, one.program);
+    culprit.jobs += one.jobs;
+    culprit.main += one.main;
+    culprit.time += one.time;
   }
-  return sorted(std::move(found));
 }
+
+std::vector<Culprit> CulpritCount::sorted() const { return metrics::sorted(found_); }
 
 }  // namespace redag::metrics

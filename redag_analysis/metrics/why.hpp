@@ -3,28 +3,34 @@
 
 // Explains where the time of a job went, from its release to its end, or end to end: backwards along the data that it
 // waited for. The parts of an explanation sum exactly to that time. A part has a cause only where the trace, or the
-// kernel's record of the run, shows it; other time is called unknown. why_text.hpp has the words. Not thread-safe.
+// kernel's record of the run, shows it; other time is called unknown. why_text.hpp has the words. Reads the run's
+// events several times; memory grows with the jobs to explain, and not with the run. Not thread-safe.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
+#include <tuple>
 #include <vector>
 
-#include "redag/trace/trace.hpp"
+#include "redag/base/result.hpp"
+#include "redag/trace/recording.hpp"
 #include "redag_analysis/metrics/jobs.hpp"
 #include "redag_analysis/metrics/kernel_record.hpp"
 #include "redag_analysis/metrics/miss.hpp"
 #include "redag_analysis/metrics/why_cause.hpp"
 #include "redag_analysis/metrics/why_kernel.hpp"
-#include "redag_analysis/metrics/why_links.hpp"
 
 namespace redag::metrics {
 
-/// What to explain: a job, by its index in Investigation::jobs(), and from when on.
+/// What to explain: a job, and from when on.
 struct Subject {
-  std::size_t job = 0;
+  JobId job;
   bool end_to_end = false;  // from the release of the source whose data it carries; otherwise from its own release
 };
 
@@ -70,42 +76,81 @@ struct PartRow {
 
 class Investigation {
  public:
-  /// `trace` and `kernel` (null: there is none) must outlive this object.
-  explicit Investigation(const trace::Trace &trace, const KernelRecord *kernel = nullptr);
+  /// Takes an explanation, and the index of its subject.
+  using Visit = std::function<void(std::size_t, Explanation)>;
 
-  [[nodiscard]] const trace::RunInfo &run() const { return trace_.info; }
-  [[nodiscard]] const std::vector<JobRecord> &jobs() const { return links_.jobs(); }
-  [[nodiscard]] Miss miss(std::size_t job) const;
-  /// The number of jobs that were not released during the warm-up.
-  [[nodiscard]] std::size_t counted() const;
-  [[nodiscard]] std::optional<std::size_t> find(const JobId &job) const;
+  /// Reads the run once. Keeps up to `most` of its misses, the worst ones. What `run` refers to and `kernel` (null:
+  /// there is none) must outlive the result. Error: a damaged file.
+  [[nodiscard]] static Result<Investigation> of(const trace::Recording &run, const KernelRecord *kernel = nullptr,
+                                                std::size_t most = std::numeric_limits<std::size_t>::max());
+
+  [[nodiscard]] const trace::RunInfo &run() const { return run_.info(); }
+  /// The number of jobs that were not released during the warm-up, and how many of them missed a deadline.
+  [[nodiscard]] std::uint64_t counted() const { return survey_.counted; }
+  [[nodiscard]] std::uint64_t missed() const { return survey_.missed; }
 
   /// The jobs that missed a deadline: the latest first, relative to the deadline; then lost ones. Those released during
   /// the warm-up do not count. One that misses only its DAG's deadline is to be explained end to end.
-  [[nodiscard]] std::vector<Subject> misses() const;
+  [[nodiscard]] const std::vector<Subject> &misses() const { return survey_.misses; }
   /// Of each task the finished job that came closest to its deadline or missed it most; at most `most`, the worst
   /// first.
   [[nodiscard]] std::vector<Subject> closest(std::size_t most) const;
+  /// The worst job of a task: the first of its misses, or else the closest one.
+  [[nodiscard]] std::optional<Subject> worst_of(TaskId task) const;
+  /// Looks for a job, in another pass. Error: a damaged file.
+  [[nodiscard]] Result<std::optional<Subject>> find(const JobId &job) const;
+  /// The largest number of a job of the task.
+  [[nodiscard]] std::uint32_t last_number(TaskId task) const { return survey_.tasks[task.value].last_number; }
 
-  [[nodiscard]] std::vector<Explanation> explain(std::span<const Subject> subjects) const;
+  /// Explains jobs, each named once, in two passes. They come in order of their end. Error: a damaged file.
+  [[nodiscard]] Result<void> explain(std::span<const Subject> subjects, const Visit &visit) const;
+  /// The same, in the order of `subjects`.
+  [[nodiscard]] Result<std::vector<Explanation>> explain(std::span<const Subject> subjects) const;
 
  private:
-  [[nodiscard]] bool counts(std::size_t job) const;
-  [[nodiscard]] Subject subject_of(std::size_t job) const;
-  [[nodiscard]] Duration deadline_of(const Subject &subject) const;
-  [[nodiscard]] double closeness(const Subject &subject) const;
+  struct Ranked {
+    double share = 0;            // of the deadline
+    std::uint64_t sequence = 0;  // of equal shares the first comes first
+    Subject subject;
+  };
+  struct WorstOfTask {
+    std::optional<Ranked> late;
+    std::optional<Ranked> lost;
+    std::optional<Ranked> closest;
+    std::uint32_t last_number = 0;
+  };
+  struct Survey {
+    std::uint64_t counted = 0;
+    std::uint64_t missed = 0;
+    std::vector<Subject> misses;
+    std::vector<WorstOfTask> tasks;  // by TaskId
+  };
+  class Surveyor;
+  class Explainer;
 
-  const trace::Trace &trace_;
-  JobLinks links_;
+  Investigation(const trace::Recording &run, const KernelRecord *kernel);
+  static bool is_worse(const Ranked &a, const Ranked &b);
+  [[nodiscard]] Miss miss_of(const JobRecord &job) const;
+
+  trace::Recording run_;
   std::vector<Duration> end_to_end_;  // by TaskId: the deadline; 0: none
   std::optional<KernelView> kernel_;
+  Survey survey_;
 };
 
 /// The culprits of one job's parts: parts of one cause and one task or program together, the largest first. Work
 /// (is_work()) comes last.
 [[nodiscard]] std::vector<Culprit> culprits_of(std::span<const Part> parts);
 
-/// The culprits of several jobs together, those that delayed most jobs most first.
-[[nodiscard]] std::vector<Culprit> culprits_of(std::span<const Explanation> explanations);
+/// Adds up the culprits of several jobs.
+class CulpritCount {
+ public:
+  void add(const Explanation &explanation);
+  /// Those that delayed most jobs most come first.
+  [[nodiscard]] std::vector<Culprit> sorted() const;
+
+ private:
+  std::map<std::tuple<Cause, TaskId, std::string>, Culprit> found_;
+};
 
 }  // namespace redag::metrics

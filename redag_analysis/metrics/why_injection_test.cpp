@@ -224,14 +224,14 @@ std::string named(const Injection &injection, std::uint64_t seed, std::string &a
   info.config.max_started = injection.max_started;
   info.overheads = injection.overheads;
   const trace::Trace trace = testing::simulated(std::move(info), 30 * kMillisecond, injection.options);
-  const Investigation investigation(trace);
+  const Investigation investigation = Investigation::of(trace).value();
   for (const Subject &miss : investigation.misses()) {
-    const JobRecord &job = investigation.jobs()[miss.job];
+    const JobId &job = miss.job;
     if (trace::task_name(trace.info.workload, job.task) != "v.victim" || job.number != injection.number) continue;
     if (miss.end_to_end != injection.end_to_end) continue;
-    const Explanation one = investigation.explain(std::vector{miss})[0];
+    const Explanation one = investigation.explain(std::vector{miss}).value()[0];
     for (const Part &part : one.parts) {
-      all += std::to_string(part.length) + " " + describe(part, trace.info.workload, {job.task, job.number}) + "\n";
+      all += std::to_string(part.length) + " " + describe(part, trace.info.workload, job) + "\n";
     }
     const Culprit main = culprits_of(one.parts).front();
     return std::string(to_string(main.cause)) + " " +

@@ -3,12 +3,12 @@
 
 #include "redag_analysis/metrics/why_links.hpp"
 
-#include <algorithm>
+#include <utility>
+
+#include "redag_analysis/metrics/miss.hpp"
 
 namespace redag::metrics {
 namespace {
-
-std::uint64_t job_key(const JobId &job) { return (std::uint64_t{job.task.value} << 32U) | job.number; }
 
 // True for two timer tasks whose jobs serve each other by release (docs/model.md, "Readiness").
 bool is_aligned(const Task &a, const Task &b) {
@@ -18,34 +18,63 @@ bool is_aligned(const Task &a, const Task &b) {
 
 }  // namespace
 
-JobLinks::JobLinks(const trace::Trace &trace)
-    : trace_(trace), refs_(flatten(trace.info.workload)), jobs_(fold_jobs(trace.info.workload, trace.events)) {
-  index_.reserve(jobs_.size());
-  for (std::size_t i = 0; i < jobs_.size(); ++i) index_.emplace(job_key({jobs_[i].task, jobs_[i].number}), i);
-  last_.assign(jobs_.size(), kNone);
-  oldest_ = last_;
-  finished_.resize(refs_.size());
-  live_.resize(refs_.size());
-  for (const JobEvent &event : trace.events) {
-    if (event.task.value < refs_.size()) add(event);
+JobLinks::JobLinks(const trace::RunInfo &run)
+    : run_(run),
+      refs_(flatten(run.workload)),
+      is_sink_(sinks_of(run.workload)),
+      folder_(run.workload),
+      live_(refs_.size()),
+      finished_(refs_.size()) {}
+
+void JobLinks::add(const JobEvent &event) {
+  if (event.task.value >= refs_.size()) return;
+  folder_.add(std::span(&event, 1));
+  switch (event.kind) {
+    case JobEventKind::Released: release(event); break;
+    case JobEventKind::Ready:
+      if (const JobHandle job = find({event.task, event.job});
+          job != nullptr && task(event.task).activation == Activation::Timer) {
+        link(*job);
+      }
+      break;
+    case JobEventKind::Finished:
+    case JobEventKind::Aborted:
+    case JobEventKind::Skipped:
+      folder_.drain_ended([this](const JobRecord &record) {
+        if (const JobHandle job = find({record.task, record.number})) end(job, record);
+      });
+      break;
+    default: break;
   }
-  for (const std::vector<std::size_t> &task : live_) {
-    for (const std::size_t job : task) {
-      if (jobs_[job].ready == kNever) link_unfinished(job);
+}
+
+void JobLinks::finish() {
+  // Nothing was ready of what a job in flight waits for: the jobs that it waits for are in flight as well.
+  for (const JobRecord &record : folder_.in_flight()) {
+    const JobHandle job = find({record.task, record.number});
+    if (job == nullptr) continue;
+    job->record = record;
+    if (record.ready == kNever) link_unfinished(*job);
+  }
+  for (std::vector<JobHandle> &task : live_) {
+    for (JobHandle &job : task) {
+      complete(*job);
+      ended_.push_back(std::move(job));
     }
+    task.clear();
   }
-  finished_.clear();
-  live_.clear();
 }
 
-std::size_t JobLinks::find(const JobId &job) const {
-  const auto found = index_.find(job_key(job));
-  return found == index_.end() ? kNone : found->second;
+JobHandle JobLinks::find(const JobId &job) const {
+  for (const JobHandle &one : live_[job.task.value]) {
+    if (one->record.number == job.number) return one;
+  }
+  return nullptr;
 }
 
-Time JobLinks::end_of(std::size_t job) const {
-  const JobRecord &record = jobs_[job];
-  return record.outcome == JobOutcome::InFlight ? std::max(trace_.info.end, record.seen) : record.finish;
+Time JobLinks::end_of(const LinkedJob &job) const {
+  const JobRecord &record = job.record;
+  return record.outcome == JobOutcome::InFlight ? std::max(run_.end, record.seen) : record.finish;
 }
 
 TaskId JobLinks::predecessor(TaskId task, std::uint32_t index) const {
@@ -53,63 +82,64 @@ TaskId JobLinks::predecessor(TaskId task, std::uint32_t index) const {
   return TaskId(task.value - ref.index + index);
 }
 
-void JobLinks::add(const JobEvent &event) {
-  const std::size_t job = find({event.task, event.job});
-  if (job == kNone) return;
-  const Task &of = task(event.task);
-  std::vector<std::size_t> &live = live_[event.task.value];
-  switch (event.kind) {
-    case JobEventKind::Released:
-      live.push_back(job);
-      if (of.activation == Activation::Data) link(job);
-      break;
-    case JobEventKind::Ready:
-      if (of.activation == Activation::Timer) link(job);
-      break;
-    case JobEventKind::Finished: finished_[event.task.value].push_back(job); [[fallthrough]];
-    case JobEventKind::Aborted:
-    case JobEventKind::Skipped:
-      std::erase(live, job);
-      if (jobs_[job].ready == kNever && of.activation == Activation::Timer) link_unfinished(job);
-      break;
-    default: break;
+void JobLinks::release(const JobEvent &event) {
+  auto job = std::make_shared<LinkedJob>();
+  job->record.task = event.task;
+  job->record.number = event.job;
+  job->record.release = event.value;
+  job->record.seen = event.time;
+  if (task(event.task).activation == Activation::Data) link(*job);
+  live_[event.task.value].push_back(std::move(job));
+}
+
+void JobLinks::end(const JobHandle &job, const JobRecord &record) {
+  job->record = record;
+  complete(*job);
+  std::erase(live_[record.task.value], job);
+  if (record.ready == kNever && task(record.task).activation == Activation::Timer) link_unfinished(*job);
+  if (record.outcome == JobOutcome::Finished && !is_sink_[record.task.value]) {
+    std::deque<JobHandle> &finished = finished_[record.task.value];
+    finished.push_back(job);
+    if (finished.size() > kRecent) finished.pop_front();
   }
+  ended_.push_back(job);
+}
+
+void JobLinks::complete(LinkedJob &job) const {
+  job.has_ended = true;
+  if (job.ending == nullptr) return;
+  job.ending->is_known = true;
+  job.ending->time = end_of(job);
 }
 
 // The job of `predecessor` whose data the job has: of an aligned task that of the same release, otherwise the newest.
-std::size_t JobLinks::data_of(const Task &of, TaskId predecessor, const JobRecord &job) const {
-  constexpr std::size_t kRecent = 64;
-  const std::vector<std::size_t> &finished = finished_[predecessor.value];
-  const bool aligned = is_aligned(of, task(predecessor));
-  std::size_t newest = kNone;
-  for (std::size_t i = finished.size(); i > 0 && finished.size() - i < kRecent; --i) {
-    const std::size_t one = finished[i - 1];
-    if (aligned && jobs_[one].release == job.release) return one;
-    if (newest == kNone || jobs_[one].release > jobs_[newest].release) newest = one;
+JobHandle JobLinks::data_of(TaskId predecessor, const LinkedJob &job) const {
+  const bool aligned = is_aligned(task(job.record.task), task(predecessor));
+  const std::deque<JobHandle> &finished = finished_[predecessor.value];
+  JobHandle newest;
+  for (auto one = finished.rbegin(); one != finished.rend(); ++one) {
+    const Time release = (*one)->record.release;
+    if (aligned && release == job.record.release) return *one;
+    if (newest == nullptr || release > newest->record.release) newest = *one;
   }
   return newest;
 }
 
-void JobLinks::link(std::size_t job) {
-  const JobRecord &record = jobs_[job];
-  const Task &of = task(record.task);
-  for (const std::uint32_t index : of.predecessors) {
-    const TaskId from = predecessor(record.task, index);
-    const std::size_t data = data_of(of, from, record);
-    if (data == kNone) continue;
-    const JobRecord &one = jobs_[data];
-    if (last_[job] == kNone || one.finish > jobs_[last_[job]].finish) last_[job] = data;
-    if (oldest_[job] == kNone || one.origin < jobs_[oldest_[job]].origin) oldest_[job] = data;
+void JobLinks::link(LinkedJob &job) const {
+  for (const std::uint32_t index : task(job.record.task).predecessors) {
+    const JobHandle data = data_of(predecessor(job.record.task, index), job);
+    if (data == nullptr) continue;
+    if (job.last == nullptr || data->record.finish > job.last->record.finish) job.last = data;
+    if (job.oldest == nullptr || data->record.origin < job.oldest->record.origin) job.oldest = data;
   }
 }
 
 // A job that never was ready waited for the first job of a predecessor that was still on its way, if there was one.
-void JobLinks::link_unfinished(std::size_t job) {
-  const JobRecord &record = jobs_[job];
-  for (const std::uint32_t index : task(record.task).predecessors) {
-    const std::vector<std::size_t> &live = live_[predecessor(record.task, index).value];
+void JobLinks::link_unfinished(LinkedJob &job) const {
+  for (const std::uint32_t index : task(job.record.task).predecessors) {
+    const std::vector<JobHandle> &live = live_[predecessor(job.record.task, index).value];
     if (live.empty()) continue;
-    if (last_[job] == kNone || jobs_[live.front()].release < jobs_[last_[job]].release) last_[job] = live.front();
+    if (job.last == nullptr || live.front()->record.release < job.last->record.release) job.last = live.front();
   }
 }
 

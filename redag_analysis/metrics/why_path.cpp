@@ -31,8 +31,8 @@ std::vector<KernelView::Stretch> cut_at(std::vector<KernelView::Stretch> stretch
 
 }  // namespace
 
-std::vector<Part> WhyPath::parts_of(std::size_t job, Time begin, Time end, bool end_to_end) {
-  explained_ = job;
+std::vector<Part> WhyPath::parts_of(const LinkedJob &job, Time begin, Time end, bool end_to_end) {
+  explained_ = &job;
   end_to_end_ = end_to_end;
   walk(job, begin, end, true);
   std::vector<Part> merged;
@@ -50,14 +50,14 @@ std::vector<Part> WhyPath::parts_of(std::size_t job, Time begin, Time end, bool 
   return merged;
 }
 
-void WhyPath::add(std::size_t job, const Stretch &stretch, Time begin, Time end, JobId by) {
+void WhyPath::add(const LinkedJob &job, const Stretch &stretch, Time begin, Time end, JobId by) {
   begin = std::max(begin, stretch.begin);
   end = std::min(end, stretch.end);
-  if (begin < end) parts_.push_back({stretch.cause, id_of(job), by, stretch.program, begin, end - begin});
+  if (begin < end) parts_.push_back({stretch.cause, job.id(), by, stretch.program, begin, end - begin});
 }
 
-void WhyPath::walk(std::size_t job, Time begin, Time end, bool on_way) {
-  const JobRecord &record = links_.jobs()[job];
+void WhyPath::walk(const LinkedJob &job, Time begin, Time end, bool on_way) {
+  const JobRecord &record = job.record;
   const Time release = std::clamp(record.release, begin, end);
   const Time seen = std::clamp(record.seen, release, end);
   if (begin < release) before_release(job, begin, release, on_way);
@@ -65,7 +65,7 @@ void WhyPath::walk(std::size_t job, Time begin, Time end, bool on_way) {
   late_release(job, release, seen);
   Time at = seen;
   Duration used = 0;
-  for (const Wait &wait : waits_[job]) {
+  for (const Wait &wait : job.waits) {
     if (wait.begin >= end) break;
     add(job, {Cause::Unknown, {}, at, wait.begin}, at, end);
     at = std::max(at, wait.begin);
@@ -73,7 +73,7 @@ void WhyPath::walk(std::size_t job, Time begin, Time end, bool on_way) {
     if (wait.cause == Cause::Execution) {
       for (const Stretch &stretch : on_worker(job, wait, used)) {
         if (stretch.cause == Cause::Execution && !on_way) {
-          add(job, {Cause::Predecessor, {}, stretch.begin, stretch.end}, at, until, id_of(job));
+          add(job, {Cause::Predecessor, {}, stretch.begin, stretch.end}, at, until, job.id());
         } else {
           add(job, stretch, at, until);
         }
@@ -90,24 +90,24 @@ void WhyPath::walk(std::size_t job, Time begin, Time end, bool on_way) {
 }
 
 // The job was not released. A data task's release is the end of a predecessor; a timer's comes by itself.
-void WhyPath::before_release(std::size_t job, Time begin, Time end, bool on_way) {
-  const bool is_timer = links_.task(links_.jobs()[job].task).activation == Activation::Timer;
-  const std::size_t last = links_.last(job);
+void WhyPath::before_release(const LinkedJob &job, Time begin, Time end, bool on_way) {
+  const bool is_timer = links_.task(job.record.task).activation == Activation::Timer;
+  const LinkedJob *const last = job.last.get();
   if (!on_way) {
-    if (is_timer || last == JobLinks::kNone) {
+    if (is_timer || last == nullptr) {
       unreleased(job, begin, end);
     } else {
       wait_for_data(job, begin, end, false);
     }
     return;
   }
-  const std::size_t oldest = links_.oldest(job);
-  if (oldest == JobLinks::kNone) {
+  const LinkedJob *const oldest = job.oldest.get();
+  if (oldest == nullptr) {
     unreleased(job, begin, end);
     return;
   }
-  const Time there = std::clamp(links_.end_of(oldest), begin, end);
-  if (begin < there) walk(oldest, begin, there, true);
+  const Time there = std::clamp(links_.end_of(*oldest), begin, end);
+  if (begin < there) walk(*oldest, begin, there, true);
   if (there >= end) return;
   if (is_timer) {
     add(job, {Cause::Sampling, {}, there, end}, there, end);
@@ -117,25 +117,25 @@ void WhyPath::before_release(std::size_t job, Time begin, Time end, bool on_way)
 }
 
 // The explained job waited for this one. Before its own release, what its data was doing is not in the trace.
-void WhyPath::unreleased(std::size_t job, Time begin, Time end) {
-  if (job == explained_) return add(job, {Cause::Unknown, {}, begin, end}, begin, end);
-  add(job, {Cause::Unreleased, {}, begin, end}, begin, end, id_of(job));
+void WhyPath::unreleased(const LinkedJob &job, Time begin, Time end) {
+  if (&job == explained_) return add(job, {Cause::Unknown, {}, begin, end}, begin, end);
+  add(job, {Cause::Unreleased, {}, begin, end}, begin, end, job.id());
 }
 
-void WhyPath::wait_for_data(std::size_t job, Time begin, Time end, bool on_way) {
-  const std::size_t last = links_.last(job);
-  if (last == JobLinks::kNone) {
+void WhyPath::wait_for_data(const LinkedJob &job, Time begin, Time end, bool on_way) {
+  const LinkedJob *const last = job.last.get();
+  if (last == nullptr) {
     add(job, {Cause::Predecessor, {}, begin, end}, begin, end);
     return;
   }
-  const Time there = std::clamp(links_.end_of(last), begin, end);
-  const bool carries_it = end_to_end_ && links_.jobs()[last].origin == links_.jobs()[job].origin;
-  if (begin < there) walk(last, begin, there, on_way && carries_it);
+  const Time there = std::clamp(links_.end_of(*last), begin, end);
+  const bool carries_it = end_to_end_ && last->record.origin == job.record.origin;
+  if (begin < there) walk(*last, begin, there, on_way && carries_it);
   add(job, {Cause::HandOver, {}, there, end}, there, end);
 }
 
-void WhyPath::late_release(std::size_t job, Time begin, Time end) {
-  const JobRecord &record = links_.jobs()[job];
+void WhyPath::late_release(const LinkedJob &job, Time begin, Time end) {
+  const JobRecord &record = job.record;
   if (begin >= end) return;
   if (links_.task(record.task).activation == Activation::Data) {
     add(job, {Cause::HandOver, {}, begin, end}, begin, end);
@@ -152,13 +152,13 @@ void WhyPath::late_release(std::size_t job, Time begin, Time end) {
   }
 }
 
-std::optional<int> WhyPath::thread_of(std::size_t job) const {
-  return kernel_ == nullptr ? std::nullopt : kernel_->thread_of(id_of(job));
+std::optional<int> WhyPath::thread_of(const LinkedJob &job) const {
+  return kernel_ == nullptr ? std::nullopt : kernel_->thread_of(job.id());
 }
 
 // What the job did while it had a worker. `used` is what it has executed.
-std::vector<KernelView::Stretch> WhyPath::on_worker(std::size_t job, const Wait &wait, Duration &used) const {
-  const JobRecord &record = links_.jobs()[job];
+std::vector<KernelView::Stretch> WhyPath::on_worker(const LinkedJob &job, const Wait &wait, Duration &used) const {
+  const JobRecord &record = job.record;
   const Time start = std::clamp(record.start, wait.begin, wait.end);
   const Time end = std::clamp(links_.end_of(job), start, wait.end);
   const std::optional<int> thread = thread_of(job);
@@ -187,9 +187,9 @@ std::vector<KernelView::Stretch> WhyPath::on_worker(std::size_t job, const Wait 
 
 // On threads the trace has the processor time of the whole body, and not when it was used. It is compared with the time
 // on a worker, if [begin, end) covers all of it.
-void WhyPath::measure(std::size_t job, std::size_t first, Time begin, Time end) {
-  const JobRecord &record = links_.jobs()[job];
-  const JobId id = id_of(job);
+void WhyPath::measure(const LinkedJob &job, std::size_t first, Time begin, Time end) {
+  const JobRecord &record = job.record;
+  const JobId id = job.id();
   const auto is_own = [&](const Part &part) {
     return part.job == id && (part.cause == Cause::Execution || (part.cause == Cause::Predecessor && part.by == id));
   };

@@ -16,37 +16,34 @@ namespace redag::metrics {
 class WhyPath {
  public:
   /// `kernel` is null if there is no record.
-  WhyPath(const trace::RunInfo &info, const JobLinks &links, const std::vector<std::vector<Wait>> &waits,
-          const KernelView *kernel)
-      : info_(info), links_(links), waits_(waits), kernel_(kernel) {}
+  WhyPath(const trace::RunInfo &info, const JobLinks &links, const KernelView *kernel)
+      : info_(info), links_(links), kernel_(kernel) {}
 
-  /// Returns parts whose lengths sum to end - begin. Requires begin <= end, and that the waits of the job and of all
-  /// jobs on its way are known. Call once.
-  [[nodiscard]] std::vector<Part> parts_of(std::size_t job, Time begin, Time end, bool end_to_end);
+  /// Returns parts whose lengths sum to end - begin. Requires begin <= end, and that the job and all jobs on its way
+  /// have ended and were followed, with the names of their holders. Call once.
+  [[nodiscard]] std::vector<Part> parts_of(const LinkedJob &job, Time begin, Time end, bool end_to_end);
 
  private:
   using Stretch = KernelView::Stretch;
 
   // Each adds the time [begin, end) of a job. `on_way`: the job's work is part of the explained job's own way, and not
   // a wait of it.
-  void walk(std::size_t job, Time begin, Time end, bool on_way);
-  void before_release(std::size_t job, Time begin, Time end, bool on_way);
-  void unreleased(std::size_t job, Time begin, Time end);
-  void wait_for_data(std::size_t job, Time begin, Time end, bool on_way);
-  void late_release(std::size_t job, Time begin, Time end);
-  void add(std::size_t job, const Stretch &stretch, Time begin, Time end, JobId by = {});
+  void walk(const LinkedJob &job, Time begin, Time end, bool on_way);
+  void before_release(const LinkedJob &job, Time begin, Time end, bool on_way);
+  void unreleased(const LinkedJob &job, Time begin, Time end);
+  void wait_for_data(const LinkedJob &job, Time begin, Time end, bool on_way);
+  void late_release(const LinkedJob &job, Time begin, Time end);
+  void add(const LinkedJob &job, const Stretch &stretch, Time begin, Time end, JobId by = {});
 
-  [[nodiscard]] std::vector<Stretch> on_worker(std::size_t job, const Wait &wait, Duration &used) const;
-  void measure(std::size_t job, std::size_t first, Time begin, Time end);
+  [[nodiscard]] std::vector<Stretch> on_worker(const LinkedJob &job, const Wait &wait, Duration &used) const;
+  void measure(const LinkedJob &job, std::size_t first, Time begin, Time end);
   [[nodiscard]] bool is_simulated() const { return info_.driver == trace::Driver::Simulator; }
-  [[nodiscard]] std::optional<int> thread_of(std::size_t job) const;
-  [[nodiscard]] JobId id_of(std::size_t job) const { return {links_.jobs()[job].task, links_.jobs()[job].number}; }
+  [[nodiscard]] std::optional<int> thread_of(const LinkedJob &job) const;
 
   const trace::RunInfo &info_;
   const JobLinks &links_;
-  const std::vector<std::vector<Wait>> &waits_;
   const KernelView *kernel_;
-  std::size_t explained_ = JobLinks::kNone;
+  const LinkedJob *explained_ = nullptr;
   bool end_to_end_ = false;
   std::vector<Part> parts_;
 };

@@ -44,15 +44,16 @@ Duration time_of(const Explanation &explanation, std::initializer_list<Cause> ca
 }
 
 std::vector<Explanation> explain_all(const trace::Trace &trace, bool end_to_end = false) {
-  const Investigation investigation(trace);
   std::vector<Subject> subjects;
-  for (std::size_t i = 0; i < investigation.jobs().size(); ++i) subjects.push_back({i, end_to_end});
-  return investigation.explain(subjects);
+  for (const JobRecord &job : fold_jobs(trace.info.workload, trace.events)) {
+    subjects.push_back({{job.task, job.number}, end_to_end});
+  }
+  return Investigation::of(trace).value().explain(subjects).value();
 }
 
 std::vector<Explanation> explain_misses(const trace::Trace &trace) {
-  const Investigation investigation(trace);
-  return investigation.explain(investigation.misses());
+  const Investigation investigation = Investigation::of(trace).value();
+  return investigation.explain(investigation.misses()).value();
 }
 
 std::string to_text(const trace::Trace &trace, const Explanation &explanation) {
@@ -278,11 +279,11 @@ TEST(Why, OfAnAndJoinTheWayFollowsTheOldestDataAndTheWaitTheLastOne) {
 TEST(Why, WithoutAMissThereAreTheJobsClosestToTheirDeadlines) {
   const trace::Trace trace =
       simulated(testing::run_info(make_workload({make_dag("d", {{"a", 10, 1}, {"b", 10, 2}})}, 1)), 50 * kMillisecond);
-  const Investigation investigation(trace);
+  const Investigation investigation = Investigation::of(trace).value();
   EXPECT_TRUE(investigation.misses().empty());
   const std::vector<Subject> closest = investigation.closest(3);
   ASSERT_EQ(closest.size(), 2U);
-  EXPECT_EQ(to_text(trace, investigation.explain(closest)[0]),
+  EXPECT_EQ(to_text(trace, investigation.explain(closest).value()[0]),
             "d.b#0 met its deadline of 10ms with 7ms to spare\n"
             "1000000 queued behind d.a#0 (100 Hz)\n"
             "2000000 executed\n");
@@ -355,8 +356,8 @@ KernelRecord kernel_record(int priority = 50) {
 TEST(Why, TheKernelsRecordNamesTheOtherProgram) {
   const trace::Trace trace = threads_trace(on_threads().at(13).executed("a", 0, 0, 5).finished("a", 0, 0));
   const auto text = [&](const KernelRecord &record) {
-    const Investigation investigation(trace, &record);
-    const Explanation one = investigation.explain(std::vector<Subject>{{0, false}})[0];
+    const Investigation investigation = Investigation::of(trace, &record).value();
+    const Explanation one = investigation.explain(std::vector<Subject>{{{TaskId(0), 0}, false}}).value()[0];
     EXPECT_EQ(sum_of(one), 13 * kMillisecond);
     return to_text(trace, one);
   };
@@ -384,8 +385,8 @@ TEST(Why, SumsHoldWithAnyRecordOfTheKernel) {
     KernelRecord record = kernel_record();
     std::erase_if(record.switches, [&](const KernelSwitch &) { return chance(rng, 0.4); });
     for (KernelSwitch &one : record.switches) one.runnable = chance(rng, 0.5);
-    const Investigation investigation(trace, &record);
-    const Explanation one = investigation.explain(std::vector<Subject>{{0, false}})[0];
+    const Investigation investigation = Investigation::of(trace, &record).value();
+    const Explanation one = investigation.explain(std::vector<Subject>{{{TaskId(0), 0}, false}}).value()[0];
     ASSERT_EQ(sum_of(one), 13 * kMillisecond) << to_text(trace, one);
   }
 }

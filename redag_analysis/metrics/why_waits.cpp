@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <deque>
+#include <utility>
+#include <vector>
 
 #include "redag/model/clusters.hpp"
 #include "redag/sched/cluster_config.hpp"
@@ -26,59 +28,66 @@ ClusterPart as_followed(ClusterPart part, const RuleSet &rules) {
 // Follows one cluster, whose ids count from 0.
 class ClusterWaits {
  public:
-  ClusterWaits(const ClusterPart &part, const trace::RunInfo &info, const JobLinks &links)
+  ClusterWaits(const ClusterPart &part, const trace::RunInfo &info)
       : rules_(rules_for(info)),
         part_(as_followed(part, rules_)),
         config_(sched::config_of(info.config, part_)),
-        replay_(part_.workload, config_),
-        links_(links) {}
+        replay_(part_.workload, config_) {}
 
-  void add(JobEvent event, const std::vector<bool> &chosen, std::vector<std::vector<Wait>> &waits) {
-    if (!any_ || event.time > time_) {
-      if (any_) extend(event.time, waits);
-      time_ = event.time;
+  /// Adds the time until `time` to the stretches of all followed jobs.
+  void advance(Time time, const JobLinks &links) {
+    if (!any_ || time > time_) {
+      if (any_) extend(time, links);
+      time_ = time;
       any_ = true;
-    }
-    const std::size_t job = links_.find({part_.tasks[event.task.value], event.job});
-    if (event.worker != WorkerId::kNoneValue) event.worker -= part_.first_worker;
-    replay_.apply(event);
-    if (job == JobLinks::kNone || !chosen[job]) return;
-    if (event.kind == JobEventKind::Released) followed_.push_back({event.task, event.job, job});
-    if (replay_.find(event.task, event.job) == nullptr) {
-      std::erase_if(followed_, [job](const Followed &one) { return one.index == job; });
     }
   }
 
-  /// Adds the time until `until` to the stretches of all followed jobs.
-  void extend(Time until, std::vector<std::vector<Wait>> &waits) {
-    for (const Followed &job : followed_) {
-      const LiveJob *live = replay_.find(job.task, job.number);
-      if (live == nullptr || until <= time_) continue;
-      const Wait now = reason(*live);
-      std::vector<Wait> &list = waits[job.index];
-      if (!list.empty() && list.back().cause == now.cause && list.back().by == now.by && list.back().end == time_) {
-        list.back().end = until;
-      } else {
-        list.push_back({now.cause, now.by, time_, until});
-      }
-    }
+  /// `follow`: the job that the event releases, if it is to be followed.
+  void add(JobEvent event, JobHandle follow) {
+    if (event.worker != WorkerId::kNoneValue) event.worker -= part_.first_worker;
+    replay_.apply(event);
+    if (follow != nullptr) followed_.push_back({event.task, event.job, std::move(follow)});
+    if (followed_.empty() || replay_.find(event.task, event.job) != nullptr) return;
+    std::erase_if(followed_, [&](const Followed &one) { return one.task == event.task && one.number == event.job; });
   }
 
  private:
   struct Followed {
     TaskId task;
     std::uint32_t number;
-    std::size_t index;  // in JobLinks
+    JobHandle job;
   };
 
-  [[nodiscard]] Wait by(Cause cause, const LiveJob *job) const {
-    return {cause, job == nullptr ? JobId{} : JobId{part_.tasks[job->task.value], job->number}, 0, 0};
+  void extend(Time until, const JobLinks &links) {
+    for (const Followed &job : followed_) {
+      const LiveJob *live = replay_.find(job.task, job.number);
+      if (live == nullptr || until <= time_) continue;
+      Wait now = reason(*live, links);
+      std::vector<Wait> &list = job.job->waits;
+      if (!list.empty() && is_same(list.back(), now) && list.back().end == time_) {
+        list.back().end = until;
+      } else {
+        now.begin = time_;
+        now.end = until;
+        list.push_back(std::move(now));
+      }
+    }
   }
 
-  [[nodiscard]] Wait reason(const LiveJob &job) const {
+  static bool is_same(const Wait &a, const Wait &b) {
+    if (a.cause != b.cause || a.by != b.by || (a.holders == nullptr) != (b.holders == nullptr)) return false;
+    return a.holders == nullptr || *a.holders == *b.holders;
+  }
+
+  [[nodiscard]] Wait by(Cause cause, const LiveJob *job) const {
+    return {cause, job == nullptr ? JobId{} : JobId{part_.tasks[job->task.value], job->number}, 0, 0, nullptr};
+  }
+
+  [[nodiscard]] Wait reason(const LiveJob &job, const JobLinks &links) const {
     switch (job.state) {
       case State::Waiting: return by(Cause::Predecessor, nullptr);
-      case State::Ready: return not_started(job);
+      case State::Ready: return not_started(job, links);
       case State::Running: return by(Cause::Execution, nullptr);
       case State::Suspended: return not_resumed(job);
       case State::AtDevice: return at_device(job);
@@ -89,29 +98,29 @@ class ClusterWaits {
     return by(Cause::Unknown, nullptr);
   }
 
-  // Of the started jobs of the tasks in question, the one that ends first: it lets the next one start.
+  // Of the started jobs of the tasks in question, the one that ends first lets the next one start.
   template <class Concerns>
-  [[nodiscard]] const LiveJob *holder(Concerns concerns) const {
-    const LiveJob *first = nullptr;
-    Time first_end = kNever;
+  [[nodiscard]] Wait held(Cause cause, const JobLinks &links, Concerns concerns) const {
+    Holders holders;
     for (std::size_t t = 0; t < replay_.task_count(); ++t) {
       if (!concerns(TaskId(t))) continue;
       for (const LiveJob &job : replay_.jobs_of(TaskId(t))) {
         if (!job.started()) continue;
-        const std::size_t index = links_.find({part_.tasks[t], job.number});
-        const Time end = index == JobLinks::kNone ? kNever : links_.end_of(index);
-        if (first != nullptr && end >= first_end) continue;
-        first = &job;
-        first_end = end;
+        const JobHandle holder = links.find({part_.tasks[t], job.number});
+        if (holder == nullptr) continue;
+        if (holder->ending == nullptr) holder->ending = std::make_shared<Ending>(Ending{.job = holder->id()});
+        holders.push_back(holder->ending);
       }
     }
-    return first;
+    Wait wait = by(cause, nullptr);
+    if (!holders.empty()) wait.holders = std::make_shared<const Holders>(std::move(holders));
+    return wait;
   }
 
-  [[nodiscard]] Wait not_started(const LiveJob &job) const {
+  [[nodiscard]] Wait not_started(const LiveJob &job, const JobLinks &links) const {
     const Replay::Gate gate = replay_.gate(job.task);
     if (gate == Replay::Gate::Task) {
-      return by(Cause::OwnTask, holder([&](TaskId other) { return other == job.task; }));
+      return held(Cause::OwnTask, links, [&](TaskId other) { return other == job.task; });
     }
     for (const LiveJob &other : replay_.jobs_of(job.task)) {
       if (other.number == job.number) break;
@@ -119,13 +128,13 @@ class ClusterWaits {
     }
     if (gate == Replay::Gate::Dag) {
       const DagId dag = replay_.dag_of(job.task);
-      return by(Cause::MaxActive, holder([&](TaskId other) { return replay_.dag_of(other) == dag; }));
+      return held(Cause::MaxActive, links, [&](TaskId other) { return replay_.dag_of(other) == dag; });
     }
     if (gate == Replay::Gate::Group) {
       const std::uint32_t group = replay_.group_of(job.task);
-      return by(Cause::Group, holder([&](TaskId other) { return replay_.group_of(other) == group; }));
+      return held(Cause::Group, links, [&](TaskId other) { return replay_.group_of(other) == group; });
     }
-    if (replay_.at_thread_limit()) return by(Cause::NoThread, holder([](TaskId) { return true; }));
+    if (replay_.at_thread_limit()) return held(Cause::NoThread, links, [](TaskId) { return true; });
     return occupied(job, Cause::Queued);
   }
 
@@ -168,7 +177,6 @@ class ClusterWaits {
   const ClusterPart part_;
   const sched::Config config_;
   Replay replay_;
-  const JobLinks &links_;
   std::vector<Followed> followed_;
   Time time_ = 0;
   bool any_ = false;
@@ -176,21 +184,64 @@ class ClusterWaits {
 
 }  // namespace
 
-std::vector<std::vector<Wait>> waits_of(const trace::Trace &trace, const JobLinks &links,
-                                        const std::vector<bool> &chosen) {
-  std::vector<std::vector<Wait>> waits(links.jobs().size());
-  const std::vector<ClusterPart> parts = parts_of(trace.info.workload);
-  const std::vector<TaskPlace> places = places_in(parts);
-  std::deque<ClusterWaits> clusters;  // keeps its elements where they are
-  for (const ClusterPart &part : parts) clusters.emplace_back(part, trace.info, links);
-  for (JobEvent event : trace.events) {
-    if (event.task.value >= places.size() || is_of_body(event.kind)) continue;
-    const TaskPlace &place = places[event.task.value];
-    event.task = place.task;
-    clusters[place.part].add(event, chosen, waits);
+class WaitWatch::Impl {
+ public:
+  Impl(const trace::RunInfo &run, IsChosen is_chosen)
+      : run_(run), is_chosen_(std::move(is_chosen)), parts_(parts_of(run.workload)), places_(places_in(parts_)) {
+    for (const ClusterPart &part : parts_) clusters_.emplace_back(part, run);
   }
-  for (ClusterWaits &cluster : clusters) cluster.extend(trace.info.end, waits);
-  return waits;
+
+  void add(const JobEvent &event, JobLinks &links) {
+    if (event.task.value >= places_.size() || is_of_body(event.kind)) {
+      links.add(event);
+      return;
+    }
+    const TaskPlace &place = places_[event.task.value];
+    clusters_[place.part].advance(event.time, links);
+    links.add(event);
+    const JobId id{event.task, event.job};
+    JobHandle follow;
+    if (event.kind == JobEventKind::Released && is_chosen_(id)) follow = links.find(id);
+    JobEvent within = event;
+    within.task = place.task;
+    clusters_[place.part].add(within, std::move(follow));
+  }
+
+  void finish(JobLinks &links) {
+    for (ClusterWaits &cluster : clusters_) cluster.advance(run_.end, links);
+    links.finish();
+  }
+
+ private:
+  const trace::RunInfo &run_;
+  IsChosen is_chosen_;
+  std::vector<ClusterPart> parts_;
+  std::vector<TaskPlace> places_;
+  std::deque<ClusterWaits> clusters_;  // keeps its elements where they are
+};
+
+WaitWatch::WaitWatch(const trace::RunInfo &run, IsChosen is_chosen)
+    : impl_(std::make_unique<Impl>(run, std::move(is_chosen))) {}
+WaitWatch::~WaitWatch() = default;
+
+void WaitWatch::add(const JobEvent &event, JobLinks &links) { impl_->add(event, links); }
+void WaitWatch::finish(JobLinks &links) { impl_->finish(links); }
+
+bool has_known_holders(const LinkedJob &job) {
+  return std::all_of(job.waits.begin(), job.waits.end(), [](const Wait &wait) {
+    return wait.holders == nullptr ||
+           std::all_of(wait.holders->begin(), wait.holders->end(), [](const auto &holder) { return holder->is_known; });
+  });
+}
+
+void name_holders(LinkedJob &job) {
+  for (Wait &wait : job.waits) {
+    if (wait.holders == nullptr) continue;
+    const auto first = std::min_element(wait.holders->begin(), wait.holders->end(),
+                                        [](const auto &a, const auto &b) { return a->time < b->time; });
+    wait.by = (*first)->job;
+    wait.holders.reset();
+  }
 }
 
 }  // namespace redag::metrics

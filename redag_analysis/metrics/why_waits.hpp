@@ -1,29 +1,41 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What kept chosen jobs from ending at every instant, as the decisions in a trace tell it: one pass over the events.
-// Internal to metrics/.
+// What kept chosen jobs from ending at every instant, as the decisions in a trace tell it, while its events pass by.
+// Internal to metrics/. Not thread-safe.
 #pragma once
 
-#include <vector>
+#include <functional>
+#include <memory>
 
 #include "redag/trace/trace.hpp"
-#include "redag_analysis/metrics/why_cause.hpp"
 #include "redag_analysis/metrics/why_links.hpp"
 
 namespace redag::metrics {
 
-/// A stretch between two decisions. Cause::Predecessor: the job lacked data. Cause::Execution: it had a worker.
-struct Wait {
-  Cause cause = Cause::Unknown;
-  JobId by;
-  Time begin = 0;
-  Time end = 0;
+/// Fills LinkedJob::waits of the jobs that it follows.
+class WaitWatch {
+ public:
+  using IsChosen = std::function<bool(const JobId &)>;
+
+  /// Follows the jobs for which `is_chosen` returns true. `run` must outlive this object.
+  WaitWatch(const trace::RunInfo &run, IsChosen is_chosen);
+  WaitWatch(WaitWatch &&) = delete;
+  ~WaitWatch();
+
+  /// Continues from the last call, and passes each event on to `links`.
+  void add(const JobEvent &event, JobLinks &links);
+  /// Ends the run.
+  void finish(JobLinks &links);
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
 };
 
-/// Returns for each job of `links` the stretches from when its release was seen to its end, in order of time. Jobs for
-/// which `chosen` is false get none.
-[[nodiscard]] std::vector<std::vector<Wait>> waits_of(const trace::Trace &trace, const JobLinks &links,
-                                                      const std::vector<bool> &chosen);
+/// True if it is known which of the holders of all waits of the job was the first to end.
+[[nodiscard]] bool has_known_holders(const LinkedJob &job);
+/// Names it, as the cause of each wait. Requires that it is known.
+void name_holders(LinkedJob &job);
 
 }  // namespace redag::metrics

@@ -11,33 +11,50 @@
 namespace redag::report {
 namespace {
 
-constexpr std::size_t kBodyPoints = 60;  // evenly over the first nine tenths
-constexpr double kPointsPerDecade = 20;  // of the remaining share
+constexpr std::uint64_t kBodyPoints = 60;  // evenly over the first nine tenths
+constexpr double kPointsPerDecade = 20;    // of the remaining share
+
+// Thins out `all`, which has each different value with the number of values up to it.
+std::vector<CurvePoint> thinned(const std::vector<CurvePoint> &all) {
+  std::vector<CurvePoint> points;
+  if (all.empty()) return points;
+  const std::uint64_t n = all.back().count;
+  std::vector<std::uint64_t> ranks = {1, n};
+  for (std::uint64_t i = 1; i <= kBodyPoints; ++i)
+    ranks.push_back(std::max<std::uint64_t>(1, n * 9 * i / (10 * kBodyPoints)));
+  for (double i = 0;; ++i) {
+    const double above = 0.1 * std::pow(10.0, -i / kPointsPerDecade) * static_cast<double>(n);
+    if (above < 1) break;
+    ranks.push_back(n - static_cast<std::uint64_t>(above));
+  }
+  std::sort(ranks.begin(), ranks.end());
+  auto point = all.begin();
+  for (const std::uint64_t rank : ranks) {
+    while (point->count < rank) ++point;
+    if (rank > 0 && (points.empty() || points.back() != *point)) points.push_back(*point);
+  }
+  return points;
+}
 
 }  // namespace
 
 std::vector<CurvePoint> curve_of(const std::vector<Duration> &sorted) {
-  std::vector<CurvePoint> points;
-  if (sorted.empty()) return points;
-  const std::size_t n = sorted.size();
-  std::vector<std::size_t> ranks = {1, n};
-  for (std::size_t i = 1; i <= kBodyPoints; ++i)
-    ranks.push_back(std::max<std::size_t>(1, n * 9 * i / (10 * kBodyPoints)));
-  for (double i = 0;; ++i) {
-    const double above = 0.1 * std::pow(10.0, -i / kPointsPerDecade) * static_cast<double>(n);
-    if (above < 1) break;
-    ranks.push_back(n - static_cast<std::size_t>(above));
+  std::vector<CurvePoint> all;
+  for (std::size_t i = 0; i < sorted.size(); ++i) {
+    if (i + 1 == sorted.size() || sorted[i + 1] != sorted[i]) all.push_back({sorted[i], i + 1});
   }
-  std::sort(ranks.begin(), ranks.end());
-  for (const std::size_t rank : ranks) {
-    if (rank == 0) continue;
-    const Duration value = sorted[rank - 1];
-    // The count includes all values equal to this one.
-    const auto above = std::upper_bound(sorted.begin() + static_cast<std::ptrdiff_t>(rank - 1), sorted.end(), value);
-    const CurvePoint point{value, static_cast<std::uint64_t>(above - sorted.begin())};
-    if (points.empty() || points.back() != point) points.push_back(point);
+  return thinned(all);
+}
+
+std::vector<CurvePoint> curve_of(const metrics::DurationSketch &values) {
+  std::vector<CurvePoint> all;
+  std::uint64_t count = 0;
+  for (const metrics::CountedDurations &some : values.counted()) {
+    if (all.empty() && some.low < some.high) all.push_back({some.low, 1});  // the smallest value is known exactly
+    count += some.count;
+    all.push_back({some.high, count});
   }
-  return points;
+  return thinned(all);
 }
 
 void LatenessHistogram::add(Duration lateness, Duration deadline) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "redag/base/time.hpp"
+#include "redag_analysis/metrics/duration_sketch.hpp"
 
 namespace redag::report {
 
@@ -25,6 +26,8 @@ struct CurvePoint {
 /// towards the largest value, as the percentiles 90, 99, 99.9 % ... require. There are at most about 60 points and 20
 /// for each power of ten.
 [[nodiscard]] std::vector<CurvePoint> curve_of(const std::vector<Duration> &sorted);
+/// The same of the values of a sketch. Of one that is not exact, points are the upper ends of its buckets.
+[[nodiscard]] std::vector<CurvePoint> curve_of(const metrics::DurationSketch &values);
 
 /// Counts lateness L = f - (r + D) as a share of D: -1 at the release, 0 at the deadline. Classes have equal width on
 /// [-1, 1), and the last one counts all larger values. All tasks and executors share the classes and can be overlaid.

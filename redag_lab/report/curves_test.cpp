@@ -49,6 +49,27 @@ TEST(Curve, OfAMillionValuesIsSmallAndKnowsItsTail) {
   EXPECT_GE(beyond(0.99999), 8);
 }
 
+TEST(Curve, OfASketchIsThatOfItsValues) {
+  Rng rng(7);
+  std::vector<Duration> values(5'000);
+  metrics::DurationSketch exact(values.size());
+  metrics::DurationSketch counted(16);
+  for (Duration &value : values) {
+    value = static_cast<Duration>(rng() % 1'000'000);
+    exact.add(value);
+    counted.add(value);
+  }
+  std::sort(values.begin(), values.end());
+  EXPECT_EQ(curve_of(exact), curve_of(values));
+  const std::vector<CurvePoint> points = curve_of(counted);
+  EXPECT_EQ(points.front(), (CurvePoint{values.front(), 1}));
+  EXPECT_EQ(points.back(), (CurvePoint{values.back(), values.size()}));
+  for (const CurvePoint &point : points) {
+    const auto at_most = std::upper_bound(values.begin(), values.end(), point.value) - values.begin();
+    ASSERT_EQ(point.count, static_cast<std::uint64_t>(at_most)) << point.value;
+  }
+}
+
 TEST(Lateness, ClassesAreAnchoredAtReleaseAndDeadline) {
   constexpr std::size_t kHalf = LatenessHistogram::kClasses / 2;
   const auto class_of = [](Duration lateness) {

@@ -36,50 +36,90 @@ bool Group::fits(const trace::RunInfo &run) const {
          trace::worker_count(run) == trace::worker_count(info()) && same_tasks(run.workload, workload());
 }
 
-void Group::add(const std::string &path, const trace::Trace &trace, const metrics::KernelRecord *kernel) {
-  REDAG_CHECK(fits(trace.info), "jobs of different runs counted together");
-  const std::vector<JobRecord> jobs = metrics::fold_jobs(trace.info.workload, trace.events);
+Result<void> Group::add(const std::string &path, const trace::Recording &run, const metrics::KernelRecord *kernel) {
+  REDAG_CHECK(fits(run.info()), "jobs of different runs counted together");
   const bool is_first = runs_.empty();
+  if (is_first) begin(run.info());
+  Result<RunDigest> digest = read(path, run);
+  if (!digest) return tl::unexpected<Diagnostics>(std::move(digest.error()));
   if (is_first) {
-    take_first(trace, jobs);
-    why_ = why_of(trace, kernel, schedule_);
+    Result<Schedule> schedule = schedule_of(run, options_.most_slices, options_.most_views);
+    if (!schedule) return tl::unexpected<Diagnostics>(std::move(schedule.error()));
+    schedule_ = *std::move(schedule);
+    Result<WhyDigest> why = why_of(run, kernel, schedule_, options_.most_explained);
+    if (!why) return tl::unexpected<Diagnostics>(std::move(why.error()));
+    why_ = *std::move(why);
   }
   const auto bound_of = [this](TaskId task) {
     return task.value < bounds_.tasks.size() ? bounds_.tasks[task.value].response.value_or(0) : Duration{0};
   };
-  metrics::AssumptionCheck check = metrics::check_assumptions(trace.info, trace.events, bound_of);
+  Result<metrics::AssumptionCheck> check = metrics::check_assumptions(run, bound_of);
+  if (!check) return tl::unexpected<Diagnostics>(std::move(check.error()));
   if (is_first) {
-    assumptions_ = std::move(check);
+    assumptions_ = *std::move(check);
   } else {
-    assumptions_.add(check);
+    assumptions_.add(*check);
   }
-  take(path, trace.info, jobs);
-  runs_.push_back(RunDigest{path, trace.info, metrics::summarize(trace),
-                            metrics::check_trace(trace, metrics::rules_for(trace.info))});
+  runs_.push_back(*std::move(digest));
+  return {};
 }
 
-void Group::take_first(const trace::Trace &trace, const std::vector<JobRecord> &jobs) {
-  const std::vector<TaskRef> refs = flatten(trace.info.workload);
-  is_sink_ = metrics::sinks_of(trace.info.workload);
-  for (const TaskRef &ref : refs) dag_of_.push_back(ref.dag);
-  samples_.resize(refs.size());
-  end_to_end_.resize(refs.size());
-  bounds_ = bounds_of(trace.info);
-  schedule_ = schedule_of(trace, jobs, options_.most_slices, options_.most_views);
-  timeline_ = timeline_of(trace, slices_of(trace), services_of(trace), jobs, options_.most_bins);
+void Group::begin(const trace::RunInfo &info) {
+  const std::size_t tasks = info.workload.task_count();
+  is_sink_ = metrics::sinks_of(info.workload);
+  samples_.resize(tasks);
+  responses_.assign(tasks, metrics::DurationSketch(metrics::exact_jobs_of_task(tasks, options_.exact_jobs)));
+  end_to_end_ = responses_;
+  bounds_ = bounds_of(info);
 }
 
-void Group::take(const std::string &path, const trace::RunInfo &info, const std::vector<JobRecord> &jobs) {
-  for (const JobRecord &job : jobs) {
-    if (job.release < info.start + info.warm_up || job.outcome != JobOutcome::Finished) continue;
-    Samples &samples = samples_[job.task.value];
-    samples.response.push_back(job.response());
-    samples.lateness.add(job.lateness(), std::max<Duration>(1, job.deadline - job.release));
-    samples.execution_max = std::max(samples.execution_max, job.processor == kNever ? job.on_worker : job.processor);
-    if (is_sink_[job.task.value]) end_to_end_[job.task.value].push_back(job.finish - job.origin);
-    if (!latest_ || relative_lateness(job) > relative_lateness(latest_->record)) {
-      latest_ = LatestJob{job, path, job.release - info.start};
-    }
+// Counts all that one pass over the events can count.
+Result<RunDigest> Group::read(const std::string &path, const trace::Recording &run) {
+  const trace::RunInfo &info = run.info();
+  metrics::Summarizer summarizer(info, options_.exact_jobs);
+  metrics::TraceChecker checker(info, metrics::rules_for(info));
+  metrics::JobFolder jobs(info.workload);
+  SliceFolder slices(info);
+  ServiceFolder services(info);
+  TimelineBuilder timeline(info, options_.most_bins);
+  const auto draw = [&timeline](const auto &one) { timeline.add(one); };
+  const Result<void> visited = run.visit([&](std::span<const JobEvent> events) {
+    summarizer.add(events);
+    if (info.lost_events == 0) checker.add(events);
+    jobs.add(events);
+    jobs.drain_ended([&](const JobRecord &job) {
+      take(path, info, job);
+      timeline.add(job);
+    });
+    slices.add(events);
+    slices.drain(draw);
+    services.add(events);
+    services.drain(draw);
+  });
+  if (!visited) return tl::unexpected<Diagnostics>(visited.error());
+  for (const JobRecord &job : jobs.in_flight()) timeline.add(job);
+  slices.finish();
+  slices.drain(draw);
+  services.finish();
+  services.drain(draw);
+  if (runs_.empty()) timeline_ = timeline.take();
+  return RunDigest{path, info, summarizer.finish(info.end), checker.finish(info.end, info.lost_events)};
+}
+
+void Group::take(const std::string &path, const trace::RunInfo &info, const JobRecord &job) {
+  if (job.release < info.start + info.warm_up || job.outcome != JobOutcome::Finished) return;
+  Samples &samples = samples_[job.task.value];
+  responses_[job.task.value].add(job.response());
+  samples.lateness.add(job.lateness(), std::max<Duration>(1, job.deadline - job.release));
+  samples.execution_max = std::max(samples.execution_max, job.processor == kNever ? job.on_worker : job.processor);
+  if (is_sink_[job.task.value]) end_to_end_[job.task.value].add(job.finish - job.origin);
+  const double lateness = relative_lateness(job);
+  const double most = latest_ ? relative_lateness(latest_->record) : lateness;
+  // Of equal ones the first that was released.
+  const bool is_first_of_equals =
+      latest_ && lateness == most && latest_->run == runs_.size() && job.sequence < latest_->record.sequence;
+  if (!latest_ || lateness > most || is_first_of_equals) {
+    latest_ = LatestJob{job, path, job.release - info.start, runs_.size()};
   }
 }
 
@@ -101,7 +141,7 @@ metrics::DagSummary Group::pooled(DagId dag) {
     }
   }
   for (metrics::SinkSummary &sink : all.end_to_end.sinks) {
-    sink.response = metrics::distribution_of(std::move(end_to_end_[sink.task.value]));
+    sink.response = end_to_end_[sink.task.value].distribution();
   }
   all.end_to_end.conclude();
   return all;
@@ -116,11 +156,13 @@ void Group::finish() {
       task_stats_[t].split.add(run.summary.tasks[t].jobs.split);
     }
     total_.add_counts(task_stats_[t]);
-    std::vector<Duration> &response = samples_[t].response;
-    std::sort(response.begin(), response.end());
-    task_stats_[t].response = metrics::distribution_of(response);
+    task_stats_[t].response = responses_[t].distribution();
+    samples_[t].responses = curve_of(responses_[t]);
+    samples_[t].is_exact = responses_[t].is_exact();
   }
   for (std::size_t d = 0; d < workload().dags.size(); ++d) dags_.push_back(pooled(DagId(d)));
+  responses_.clear();
+  end_to_end_.clear();
 }
 
 }  // namespace redag::report

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Reduces runs to the data that a report shows. Everything that grows with a run's length is counted, sampled or cut,
-// and the trace can be discarded. Runs of one executor on one workload form a group, whose figures cover all its jobs.
-// Not thread-safe.
+// Reduces runs to the data that a report shows, in several passes over their events. Everything that grows with a run's
+// length is counted, sampled or cut: memory does not grow with it. Runs of one executor on one workload form a group,
+// whose figures cover all its jobs. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,8 @@
 #include <utility>
 #include <vector>
 
-#include "redag/trace/trace.hpp"
+#include "redag/base/result.hpp"
+#include "redag/trace/recording.hpp"
 #include "redag_analysis/metrics/assumptions.hpp"
 #include "redag_analysis/metrics/check_report.hpp"
 #include "redag_analysis/metrics/jobs.hpp"
@@ -29,13 +30,16 @@ struct DigestOptions {
   std::size_t most_slices = 20'000;  // of the schedule, in all windows together
   std::size_t most_views = 6;
   std::size_t most_bins = 400;
+  std::size_t exact_jobs = metrics::kExactJobs;  // as of metrics::Summarizer
+  std::size_t most_explained = 20'000;           // misses
 };
 
-/// Per-job data of a task, 8 bytes per job.
+/// What the finished jobs of a task were like.
 struct Samples {
-  std::vector<Duration> response;  // f - r of finished jobs; sorted by Group::finish()
-  LatenessHistogram lateness;      // of the same jobs
-  Duration execution_max = 0;      // largest processor time; time on a worker where the run did not record it
+  std::vector<CurvePoint> responses;  // f - r
+  bool is_exact = true;               // `responses`, and the percentiles
+  LatenessHistogram lateness;
+  Duration execution_max = 0;  // largest processor time; time on a worker where the run did not record it
 };
 
 struct RunDigest {
@@ -48,8 +52,9 @@ struct RunDigest {
 /// The job with the largest lateness relative to its deadline.
 struct LatestJob {
   metrics::JobRecord record;
-  std::string path;  // folder of its run
-  Time since = 0;    // its release, from the start of the run
+  std::string path;     // folder of its run
+  Time since = 0;       // its release, from the start of the run
+  std::size_t run = 0;  // the number of its run in the group
 };
 
 /// What a merged run says about its hosts (hosts.json, docs/results_format.md).
@@ -65,8 +70,10 @@ class Group {
   Group(std::string label, const DigestOptions &options) : label_(std::move(label)), options_(options) {}
 
   /// Adds a run. The first run provides the schedule, the timeline and the explanations, for which `kernel` is the
-  /// kernel's record of it, if there is one. Requires fits(trace.info).
-  void add(const std::string &path, const trace::Trace &trace, const metrics::KernelRecord *kernel = nullptr);
+  /// kernel's record of it, if there is one. Requires fits(run.info()). Error: a damaged file; the group is then of no
+  /// further use.
+  [[nodiscard]] Result<void> add(const std::string &path, const trace::Recording &run,
+                                 const metrics::KernelRecord *kernel = nullptr);
   /// True if executor, mode and tasks are those of the group, whose jobs can then be counted together.
   [[nodiscard]] bool fits(const trace::RunInfo &info) const;
   /// States that the first run is one of several hosts.
@@ -98,16 +105,17 @@ class Group {
 
  private:
   [[nodiscard]] metrics::DagSummary pooled(DagId dag);
-  void take_first(const trace::Trace &trace, const std::vector<metrics::JobRecord> &jobs);
-  void take(const std::string &path, const trace::RunInfo &info, const std::vector<metrics::JobRecord> &jobs);
+  void begin(const trace::RunInfo &info);
+  [[nodiscard]] Result<RunDigest> read(const std::string &path, const trace::Recording &run);
+  void take(const std::string &path, const trace::RunInfo &info, const metrics::JobRecord &job);
 
   std::string label_;
   DigestOptions options_;
   std::vector<RunDigest> runs_;
-  std::vector<bool> is_sink_;                      // by TaskId
-  std::vector<DagId> dag_of_;                      // by TaskId
-  std::vector<Samples> samples_;                   // by TaskId
-  std::vector<std::vector<Duration>> end_to_end_;  // by TaskId: f - origin, of sinks
+  std::vector<bool> is_sink_;                        // by TaskId
+  std::vector<Samples> samples_;                     // by TaskId; `responses` once the group is finished
+  std::vector<metrics::DurationSketch> responses_;   // by TaskId: f - r, until then
+  std::vector<metrics::DurationSketch> end_to_end_;  // by TaskId: f - origin, of sinks
   std::optional<LatestJob> latest_;
   RunBounds bounds_;
   Schedule schedule_;

@@ -199,6 +199,11 @@ class GroupWriter {
     };
     cut(most_tasks, "the table of tasks shows");
     cut(most_curves, "the figures of response times and lateness show");
+    const auto is_counted = [&](const TaskRef &ref) { return !group.samples(ref.id).is_exact; };
+    if (std::any_of(refs_.begin(), refs_.end(), is_counted)) {
+      cuts.push_back(fmt::format("{}: percentiles of tasks with many jobs are accurate to {:.1f} %", group.label(),
+                                 100 * metrics::DurationSketch::kRelativeError));
+    }
     const Schedule &schedule = group.schedule();
     if (schedule.slices_shown < schedule.slices_in_all) {
       cuts.push_back(
@@ -317,7 +322,7 @@ class GroupWriter {
   static void add_curves(Json &row, const Samples &samples) {
     Json values = Json::array();
     Json counts = Json::array();
-    for (const CurvePoint &point : curve_of(samples.response)) {
+    for (const CurvePoint &point : samples.responses) {
       values.push_back(point.value);
       counts.push_back(point.count);
     }

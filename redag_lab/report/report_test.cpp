@@ -33,7 +33,9 @@ trace::Trace simulated(const Workload &workload, Duration length, const std::str
 
 Group group_of(const std::string &label, const std::vector<trace::Trace> &traces, DigestOptions options = {}) {
   Group group(label, options);
-  for (std::size_t i = 0; i < traces.size(); ++i) group.add(fmt::format("{}/repetition-{}", label, i + 1), traces[i]);
+  for (std::size_t i = 0; i < traces.size(); ++i) {
+    EXPECT_TRUE(group.add(fmt::format("{}/repetition-{}", label, i + 1), traces[i]));
+  }
   group.finish();
   return group;
 }

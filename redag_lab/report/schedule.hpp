@@ -2,36 +2,20 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The schedule as a picture: which job held which worker, and which device, when. Of a run too long to draw, it keeps
-// the interesting stretches: the beginning, and the job of each DAG closest to its deadline or latest after it. Pure
-// functions.
+// the interesting stretches: the beginning, and the job of each DAG closest to its deadline or latest after it. Reads
+// the run up to three times, in memory that does not grow with it.
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <vector>
 
-#include "redag/trace/trace.hpp"
+#include "redag/base/result.hpp"
+#include "redag/trace/recording.hpp"
 #include "redag_analysis/metrics/jobs.hpp"
 #include "redag_lab/report/services.hpp"
+#include "redag_lab/report/slices.hpp"
 
 namespace redag::report {
-
-/// A job on a worker, without interruption.
-struct Slice {
-  enum class End : std::uint8_t { Finished, Aborted, Preempted, Open, Waits };  // Open: the trace ends here
-
-  Time begin = 0;
-  Time end = 0;
-  TaskId task;
-  std::uint32_t job = 0;
-  std::uint32_t worker = 0;
-  End how = End::Open;
-
-  friend bool operator==(const Slice &, const Slice &) = default;
-};
-
-/// Returns slices in order of their begin. Events of jobs that were never released are left out.
-[[nodiscard]] std::vector<Slice> slices_of(const trace::Trace &trace);
 
 /// A stretch of the run with all the data for drawing it.
 struct Window {
@@ -59,9 +43,8 @@ struct Schedule {
   std::uint64_t slices_shown = 0;  // if less than all, the windows do not cover the run
 };
 
-/// Makes the schedule. `most` bounds the slices of all windows together, and the jobs to twice as many. `jobs` must be
-/// in order of release. The `most_views` DAGs with the latest jobs, relative to their deadlines, get a view each.
-[[nodiscard]] Schedule schedule_of(const trace::Trace &trace, std::span<const metrics::JobRecord> jobs,
-                                   std::size_t most, std::size_t most_views);
+/// Makes the schedule. `most` bounds the slices of all windows together, and the jobs to twice as many. The
+/// `most_views` DAGs with the latest jobs, relative to their deadlines, get a view each. Error: a damaged file.
+[[nodiscard]] Result<Schedule> schedule_of(const trace::Recording &run, std::size_t most, std::size_t most_views);
 
 }  // namespace redag::report

@@ -34,6 +34,23 @@ std::vector<JobRecord> jobs_of(const trace::Trace &trace) {
   return metrics::fold_jobs(trace.info.workload, trace.events);
 }
 
+std::vector<Slice> slices_of(const trace::Trace &trace) {
+  std::vector<Slice> slices;
+  SliceFolder folder(trace.info);
+  folder.add(trace.events);
+  folder.finish();
+  folder.drain([&](const Slice &slice) { slices.push_back(slice); });
+  std::stable_sort(slices.begin(), slices.end(), [](const Slice &a, const Slice &b) { return a.begin < b.begin; });
+  return slices;
+}
+
+Timeline timeline_of(const trace::Trace &trace, std::size_t most_bins) {
+  TimelineBuilder builder(trace.info, most_bins);
+  for (const Slice &slice : slices_of(trace)) builder.add(slice);
+  for (const JobRecord &job : jobs_of(trace)) builder.add(job);
+  return builder.take();
+}
+
 TEST(Slices, APreemptedJobHasTwoAndTellsHowEachEnded) {
   TraceBuilder run(hi_and_lo());
   run.at(0).arrives("l", 0).dispatched("l", 0, 0, 50);
@@ -58,7 +75,7 @@ TEST(Slices, AWaitEndsOne) {
 
 TEST(Schedule, OfAShortRunIsWholeWithAViewForEachDag) {
   const trace::Trace trace = simulated(hi_and_lo(), ms(200));
-  const Schedule schedule = schedule_of(trace, jobs_of(trace), 1000, 6);
+  const Schedule schedule = schedule_of(trace, 1000, 6).value();
   ASSERT_EQ(schedule.windows.size(), 1U);
   EXPECT_EQ(schedule.slices_shown, schedule.slices_in_all);
   EXPECT_EQ(schedule.windows[0].jobs.size(), jobs_of(trace).size());
@@ -74,7 +91,7 @@ TEST(Schedule, OfALongRunStaysSmallAndShowsTheWorstJobs) {
   const trace::Trace trace = simulated(hi_and_lo(), ms(20'000));
   const std::vector<JobRecord> jobs = jobs_of(trace);
   constexpr std::size_t kMost = 300;
-  const Schedule schedule = schedule_of(trace, jobs, kMost, 6);
+  const Schedule schedule = schedule_of(trace, kMost, 6).value();
   ASSERT_EQ(schedule.windows.size(), 3U) << "the beginning, and one for each DAG";
   EXPECT_LE(schedule.slices_shown, kMost + 10) << "those that only touch a window are in it too";
   EXPECT_GT(schedule.slices_in_all, 10 * kMost);
@@ -96,9 +113,47 @@ TEST(Schedule, OfALongRunStaysSmallAndShowsTheWorstJobs) {
   }
 }
 
+// What the windows hold, counted again from lists of all slices and jobs.
+TEST(Schedule, WindowsHaveTheirShareOfSlicesAndAllJobsWithin) {
+  const trace::Trace trace = simulated(hi_and_lo(), ms(20'000));
+  const std::vector<Slice> slices = slices_of(trace);
+  const std::vector<JobRecord> jobs = jobs_of(trace);
+  constexpr std::size_t kShare = 100;
+  const Schedule schedule = schedule_of(trace, 3 * kShare, 6).value();
+  ASSERT_EQ(schedule.windows.size(), 3U);
+  EXPECT_EQ(schedule.windows[0].begin, 0);
+  EXPECT_EQ(schedule.windows[0].end, slices[kShare - 1].begin);
+  for (std::size_t i = 1; i < schedule.views.size(); ++i) {
+    const View &view = schedule.views[i];
+    const Window &window = schedule.windows[view.window];
+    const auto job = std::find_if(jobs.begin(), jobs.end(), [&](const JobRecord &each) {
+      return each.task == view.task && each.number == view.job;
+    });
+    ASSERT_NE(job, jobs.end());
+    const auto later =
+        std::find_if(slices.begin(), slices.end(), [&](const Slice &slice) { return slice.begin >= job->finish; });
+    const auto index = static_cast<std::size_t>(later - slices.begin());
+    const std::size_t first = index > kShare * 3 / 4 ? index - kShare * 3 / 4 : 0;
+    EXPECT_EQ(window.begin, first == 0 ? 0 : slices[first].begin);
+    EXPECT_EQ(window.end, first + kShare >= slices.size() ? trace.info.end : slices[first + kShare - 1].begin);
+  }
+  for (const Window &window : schedule.windows) {
+    std::vector<Slice> slices_within;
+    for (const Slice &slice : slices) {
+      if (slice.begin <= window.end && slice.end >= window.begin) slices_within.push_back(slice);
+    }
+    EXPECT_EQ(window.slices, slices_within);
+    std::vector<JobRecord> jobs_within;
+    for (const JobRecord &job : jobs) {
+      if (job.release < window.end && std::min(job.finish, trace.info.end) >= window.begin) jobs_within.push_back(job);
+    }
+    EXPECT_EQ(window.jobs, jobs_within);
+  }
+}
+
 TEST(Schedule, OfAnEmptyTraceIsEmpty) {
   const trace::Trace trace = TraceBuilder(hi_and_lo()).until(10);
-  const Schedule schedule = schedule_of(trace, {}, 100, 6);
+  const Schedule schedule = schedule_of(trace, 100, 6).value();
   ASSERT_EQ(schedule.views.size(), 1U);
   EXPECT_TRUE(schedule.windows[schedule.views[0].window].slices.empty());
 }
@@ -107,7 +162,7 @@ TEST(Timeline, BusyTimeAndJobsAddUp) {
   const trace::Trace trace = simulated(hi_and_lo(), ms(777));
   const std::vector<Slice> slices = slices_of(trace);
   const std::vector<JobRecord> jobs = jobs_of(trace);
-  const Timeline timeline = timeline_of(trace, slices, {}, jobs, 100);
+  const Timeline timeline = timeline_of(trace, 100);
   EXPECT_LE(timeline.bins, 100U);
   Duration drawn = 0;
   for (const auto &dag : timeline.busy) {
@@ -135,7 +190,7 @@ TEST(Timeline, MissesStandWhereTheirJobsWereReleased) {
   run.at(60).arrives("h", 3).dispatched("h", 3, 0, 70);                                     // overdue at the end
   run.at(95).arrives("l", 0);                                                               // still in time
   const trace::Trace trace = run.until(100);
-  const Timeline timeline = timeline_of(trace, slices_of(trace), {}, jobs_of(trace), 10);
+  const Timeline timeline = timeline_of(trace, 10);
   ASSERT_EQ(timeline.bins, 10U);
   EXPECT_EQ(timeline.missed[0], (std::vector<std::uint64_t>{1, 0, 1, 0, 0, 0, 1, 0, 0, 0}));
   EXPECT_EQ(timeline.missed[1], std::vector<std::uint64_t>(10, 0));

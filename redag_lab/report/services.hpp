@@ -1,10 +1,12 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Which job each device served when. Pure functions.
+// Folds the events of a run into services: which job each device served when. Incremental, as JobFolder is. Not
+// thread-safe.
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "redag/trace/trace.hpp"
@@ -23,7 +25,30 @@ struct Service {
   friend bool operator==(const Service &, const Service &) = default;
 };
 
-/// Returns services in order of their begin. One in progress at the end ends with the trace.
-[[nodiscard]] std::vector<Service> services_of(const trace::Trace &trace);
+class ServiceFolder {
+ public:
+  /// `run` must outlive this object.
+  explicit ServiceFolder(const trace::RunInfo &run) : run_(run), open_(run.workload.platform.devices.size()) {}
+
+  /// Continues from the last call.
+  void add(std::span<const JobEvent> events);
+  /// Ends the services in progress at the last event, or at the end of the run if that is later.
+  void finish();
+
+  /// Passes the services that ended since the last call to visit(const Service &), in order of their end.
+  template <class Visit>
+  void drain(Visit &&visit) {
+    for (const Service &service : ended_) visit(service);
+    ended_.clear();
+  }
+
+ private:
+  void add(const JobEvent &event);
+
+  const trace::RunInfo &run_;
+  std::vector<std::vector<Service>> open_;  // by DeviceId
+  std::vector<Service> ended_;
+  Time last_ = 0;  // event
+};
 
 }  // namespace redag::report

@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "redag_lab/report/schedule.hpp"
 #include "redag_lab/report/timeline.hpp"
 #include "redag_testing/builders.hpp"
@@ -30,6 +32,17 @@ trace::Trace with_devices() {
   return run.until(20);
 }
 
+std::vector<Service> services_of(const trace::Trace &trace) {
+  std::vector<Service> services;
+  ServiceFolder folder(trace.info);
+  folder.add(trace.events);
+  folder.finish();
+  folder.drain([&](const Service &service) { services.push_back(service); });
+  std::stable_sort(services.begin(), services.end(),
+                   [](const Service &a, const Service &b) { return a.begin < b.begin; });
+  return services;
+}
+
 TEST(Services, TakeTheFirstSlotThatIsFree) {
   const TaskId a(0), b(1), c(2);
   const DeviceId gpu(0), dla(1);
@@ -41,10 +54,11 @@ TEST(Services, TakeTheFirstSlotThatIsFree) {
 
 TEST(Services, FillTheTimelineAndTheWindowsOfTheSchedule) {
   const trace::Trace trace = with_devices();
-  const auto jobs = metrics::fold_jobs(trace.info.workload, trace.events);
-  const Timeline timeline = timeline_of(trace, slices_of(trace), services_of(trace), jobs, 2);
+  TimelineBuilder builder(trace.info, 2);
+  for (const Service &service : services_of(trace)) builder.add(service);
+  const Timeline timeline = builder.take();
   EXPECT_EQ(timeline.device_busy, (std::vector<std::vector<Duration>>{{ms(4 + 7 + 5), ms(10)}, {ms(4), ms(10)}}));
-  const Schedule schedule = schedule_of(trace, jobs, 100, 1);
+  const Schedule schedule = schedule_of(trace, 100, 1).value();
   EXPECT_EQ(schedule.windows.front().services, services_of(trace));
 }
 

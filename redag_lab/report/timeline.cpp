@@ -9,57 +9,53 @@
 #include "redag_analysis/metrics/miss.hpp"
 
 namespace redag::report {
-namespace {
 
-using metrics::JobRecord;
-
-}  // namespace
-
-Timeline timeline_of(const trace::Trace &trace, std::span<const Slice> slices, std::span<const Service> services,
-                     std::span<const JobRecord> jobs, std::size_t most_bins) {
+TimelineBuilder::TimelineBuilder(const trace::RunInfo &run, std::size_t most_bins)
+    : run_(run), length_(std::max<Duration>(1, run.end - run.start)), refs_(flatten(run.workload)) {
   REDAG_CHECK(most_bins > 0, "a timeline of nothing");
-  Timeline timeline;
-  timeline.begin = trace.info.start;
-  const Duration length = std::max<Duration>(1, trace.info.end - trace.info.start);
+  timeline_.begin = run.start;
   const auto most = static_cast<Duration>(most_bins);
-  timeline.bin = (length + most - 1) / most;
-  if (timeline.bin > kMicrosecond) timeline.bin = (timeline.bin + kMicrosecond - 1) / kMicrosecond * kMicrosecond;
-  timeline.bins = static_cast<std::size_t>((length + timeline.bin - 1) / timeline.bin);
+  timeline_.bin = (length_ + most - 1) / most;
+  if (timeline_.bin > kMicrosecond) timeline_.bin = (timeline_.bin + kMicrosecond - 1) / kMicrosecond * kMicrosecond;
+  timeline_.bins = static_cast<std::size_t>((length_ + timeline_.bin - 1) / timeline_.bin);
 
-  const std::size_t dags = trace.info.workload.dags.size();
-  timeline.busy.assign(dags, std::vector<Duration>(timeline.bins, 0));
-  timeline.device_busy.assign(trace.info.workload.platform.devices.size(), std::vector<Duration>(timeline.bins, 0));
-  timeline.released.assign(dags, std::vector<std::uint64_t>(timeline.bins, 0));
-  timeline.missed = timeline.released;
-  const auto bin_at = [&](Time time) {
-    const Duration since = std::clamp<Duration>(time - timeline.begin, 0, length - 1);
-    return static_cast<std::size_t>(since / timeline.bin);
-  };
-  const auto fill = [&](std::vector<Duration> &busy, Time begin, Time end) {
-    // A job in progress at the end may have run longer, outside the timeline.
-    end = std::min(end, trace.info.end);
-    Time from = std::max(begin, timeline.begin);
-    while (from < end) {
-      const std::size_t bin = bin_at(from);
-      const Time until = std::min(end, timeline.begin + static_cast<Duration>(bin + 1) * timeline.bin);
-      busy[bin] += until - from;
-      from = until;
-    }
-  };
-  const std::vector<TaskRef> refs = flatten(trace.info.workload);
-  for (const Slice &slice : slices) {
-    fill(timeline.busy[refs[slice.task.value].dag.value], slice.begin, slice.end);
+  const std::size_t dags = run.workload.dags.size();
+  timeline_.busy.assign(dags, std::vector<Duration>(timeline_.bins, 0));
+  timeline_.device_busy.assign(run.workload.platform.devices.size(), std::vector<Duration>(timeline_.bins, 0));
+  timeline_.released.assign(dags, std::vector<std::uint64_t>(timeline_.bins, 0));
+  timeline_.missed = timeline_.released;
+}
+
+void TimelineBuilder::add(const Slice &slice) {
+  fill(timeline_.busy[refs_[slice.task.value].dag.value], slice.begin, slice.end);
+}
+
+void TimelineBuilder::add(const Service &service) {
+  fill(timeline_.device_busy[service.device.value], service.begin, service.end);
+}
+
+void TimelineBuilder::add(const metrics::JobRecord &job) {
+  const std::size_t dag = refs_[job.task.value].dag.value;
+  const std::size_t bin = bin_at(job.release);
+  ++timeline_.released[dag][bin];
+  if (metrics::miss_of(job, run_.end) != metrics::Miss::None) ++timeline_.missed[dag][bin];
+}
+
+std::size_t TimelineBuilder::bin_at(Time time) const {
+  const Duration since = std::clamp<Duration>(time - timeline_.begin, 0, length_ - 1);
+  return static_cast<std::size_t>(since / timeline_.bin);
+}
+
+void TimelineBuilder::fill(std::vector<Duration> &busy, Time begin, Time end) const {
+  // A job in progress at the end may have run longer, outside the timeline.
+  end = std::min(end, run_.end);
+  Time from = std::max(begin, timeline_.begin);
+  while (from < end) {
+    const std::size_t bin = bin_at(from);
+    const Time until = std::min(end, timeline_.begin + static_cast<Duration>(bin + 1) * timeline_.bin);
+    busy[bin] += until - from;
+    from = until;
   }
-  for (const Service &service : services) {
-    fill(timeline.device_busy[service.device.value], service.begin, service.end);
-  }
-  for (const JobRecord &job : jobs) {
-    const std::size_t dag = refs[job.task.value].dag.value;
-    const std::size_t bin = bin_at(job.release);
-    ++timeline.released[dag][bin];
-    if (metrics::miss_of(job, trace.info.end) != metrics::Miss::None) ++timeline.missed[dag][bin];
-  }
-  return timeline;
 }
 
 }  // namespace redag::report

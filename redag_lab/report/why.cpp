@@ -4,6 +4,8 @@
 #include "redag_lab/report/why.hpp"
 
 #include <algorithm>
+#include <iterator>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -14,7 +16,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::size_t kMostExplained = 20'000;
 constexpr std::size_t kMostListed = 1'000;
 constexpr std::size_t kWorst = 100;      // misses whose parts are shown
 constexpr std::size_t kMostShown = 400;  // with those in the schedule
@@ -64,25 +65,33 @@ Json to_json(const std::vector<WorstJob> &worst, const Workload &workload) {
 
 }  // namespace
 
-WhyDigest why_of(const trace::Trace &trace, const metrics::KernelRecord *kernel, const Schedule &schedule) {
-  const metrics::Investigation investigation(trace, kernel);
-  std::vector<metrics::Subject> subjects = investigation.misses();
-  WhyDigest why;
-  why.misses = subjects.size();
-  if (subjects.empty()) subjects = investigation.closest(kClosest);
-  subjects.resize(std::min(subjects.size(), kMostExplained));
-  std::vector<metrics::Explanation> all = investigation.explain(subjects);
-  why.explained = all.size();
-  why.causes = metrics::culprits_of(all);
-  for (std::size_t i = 0; i < std::min(kMostListed, all.size()); ++i) why.worst.push_back(row_of(all[i], trace.info));
+Result<WhyDigest> why_of(const trace::Recording &run, const metrics::KernelRecord *kernel, const Schedule &schedule,
+                         std::size_t most) {
+  const Result<metrics::Investigation> investigation = metrics::Investigation::of(run, kernel, most);
+  if (!investigation) return tl::unexpected<Diagnostics>(investigation.error());
+  std::vector<metrics::Subject> subjects = investigation->misses();
+  if (subjects.empty()) subjects = investigation->closest(kClosest);
   std::set<metrics::JobId> seen;
   for (const Window &window : schedule.windows) {
     for (const metrics::JobRecord &job : window.jobs) seen.insert({job.task, job.number});
   }
-  for (std::size_t i = 0; i < all.size() && why.jobs.size() < kMostShown; ++i) {
-    const bool is_seen = seen.contains({all[i].job.task, all[i].job.number});
-    if (i < kWorst || is_seen) why.jobs.push_back(std::move(all[i]));
-  }
+  WhyDigest why;
+  why.misses = investigation->missed();
+  why.explained = subjects.size();
+  why.worst.resize(std::min(kMostListed, subjects.size()));
+  metrics::CulpritCount causes;
+  std::map<std::size_t, metrics::Explanation> shown;  // by rank
+  const auto take = [&](std::size_t rank, metrics::Explanation one) {
+    causes.add(one);
+    if (rank < why.worst.size()) why.worst[rank] = row_of(one, run.info());
+    if (rank >= kWorst && !seen.contains({one.job.task, one.job.number})) return;
+    shown.emplace(rank, std::move(one));
+    if (shown.size() > kMostShown) shown.erase(std::prev(shown.end()));
+  };
+  const Result<void> explained = investigation->explain(subjects, take);
+  if (!explained) return tl::unexpected<Diagnostics>(explained.error());
+  why.causes = causes.sorted();
+  for (auto &[rank, one] : shown) why.jobs.push_back(std::move(one));
   return why;
 }
 

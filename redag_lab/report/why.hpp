@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Reduces the explanations of a run's misses to what a report shows: all causes, and the parts of a bounded number of
-// jobs. Pure functions.
+// jobs. Pure but for the file of a run.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "redag/trace/trace.hpp"
+#include "redag/base/result.hpp"
+#include "redag/trace/recording.hpp"
 #include "redag_analysis/metrics/why.hpp"
 #include "redag_lab/report/schedule.hpp"
 
@@ -25,16 +26,17 @@ struct WorstJob {
 };
 
 struct WhyDigest {
-  std::size_t misses = 0;
+  std::uint64_t misses = 0;
   std::size_t explained = 0;  // misses that the causes cover
   std::vector<metrics::Culprit> causes;
   std::vector<WorstJob> worst;             // all misses up to a limit, the worst first; without a miss the closest jobs
   std::vector<metrics::Explanation> jobs;  // the worst misses, and those that the schedule shows
 };
 
-/// Explains a run. Without a miss, the jobs are those that came closest to one. `kernel` is null if there is no record.
-[[nodiscard]] WhyDigest why_of(const trace::Trace &trace, const metrics::KernelRecord *kernel,
-                               const Schedule &schedule);
+/// Explains a run, up to `most` misses of it. Without a miss, the jobs are those that came closest to one. `kernel` is
+/// null if there is no record. Error: a damaged file.
+[[nodiscard]] Result<WhyDigest> why_of(const trace::Recording &run, const metrics::KernelRecord *kernel,
+                                       const Schedule &schedule, std::size_t most);
 
 /// Returns the object `why` of a group (docs/results_format.md) as JSON.
 [[nodiscard]] std::string to_json(const WhyDigest &why, const Workload &workload);

@@ -29,8 +29,9 @@ void trace_target(std::string_view input) {
   (void)metrics::check_trace(*trace, metrics::rules_for(trace->info));
   (void)metrics::check_trace(*trace);
   (void)metrics::summary_to_json(metrics::summarize(*trace), trace->info);
-  const metrics::Investigation investigation(*trace);
-  for (const metrics::Explanation &one : investigation.explain(investigation.misses())) {
+  const metrics::Investigation investigation = metrics::Investigation::of(*trace).value();
+  const std::vector<metrics::Explanation> explanations = investigation.explain(investigation.misses()).value();
+  for (const metrics::Explanation &one : explanations) {
     Duration sum = 0;
     for (const metrics::Part &part : one.parts) sum += part.length;
     REDAG_CHECK(sum == one.length(), "parts sum to the whole");
@@ -41,8 +42,8 @@ void trace_target(std::string_view input) {
   REDAG_CHECK(metrics::write_perfetto(folder + "/trace.pftrace", *trace).has_value(), "trace.pftrace");
   std::vector<report::Group> groups;
   groups.emplace_back("fuzz", report::digest_options(1));
-  groups.back().add(folder, *trace);
-  if (groups.back().fits(trace->info)) groups.back().add(folder, *trace);
+  REDAG_CHECK(groups.back().add(folder, *trace).has_value(), "a trace in memory can be read");
+  if (groups.back().fits(trace->info)) REDAG_CHECK(groups.back().add(folder, *trace).has_value(), "and again");
   groups.back().finish();
   (void)report::page(report::to_json(groups), report::title_of(groups));
   (void)report::verdict_of(groups.front());

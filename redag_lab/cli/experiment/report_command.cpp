@@ -8,8 +8,8 @@
 #include <system_error>
 
 #include "redag/base/text.hpp"
-#include "redag/trace/events_file.hpp"
 #include "redag/trace/output_file.hpp"
+#include "redag/trace/recording.hpp"
 #include "redag_analysis/metrics/kernel_record.hpp"
 #include "redag_lab/cli/experiment/acceptance_page.hpp"
 #include "redag_lab/cli/run/recorded_runs.hpp"
@@ -60,7 +60,6 @@ class Reporting {
       console_.error("interrupted before a run was read: there is nothing to report");
       return kExitBad;
     }
-    for (report::Group &group : groups_) group.finish();
     return write();
   }
 
@@ -76,13 +75,13 @@ class Reporting {
       for (const std::string &file : runs.traces) {
         if (InterruptGuard::interrupted()) break;
         progress_.draw(static_cast<double>(done) / static_cast<double>(count), file);
-        const Result<trace::Trace> trace = trace::read_trace(file);
+        const Result<trace::Recording> trace = trace::Recording::open(file);
         if (!trace) {
           progress_.clear();
           console_.note(trace.error());
           return false;
         }
-        if (!group.fits(trace->info)) {
+        if (!group.fits(trace->info())) {
           progress_.clear();
           console_.error(
               fmt::format("{} is not a repetition of the runs beside it: its executor, preemption mode or tasks differ",
@@ -90,24 +89,32 @@ class Reporting {
               "name folders that hold one kind of run each");
           return false;
         }
-        const Result<std::optional<metrics::KernelRecord>> kernel = read_kernel_record_of(file, trace->info);
+        const Result<std::optional<metrics::KernelRecord>> kernel = read_kernel_record_of(file, trace->info());
         if (!kernel) {
           progress_.clear();
           console_.note(kernel.error());
           return false;
         }
-        Result<std::optional<hosts::RecordedHosts>> hosts = hosts::read_hosts_of(file, trace->info);
+        Result<std::optional<hosts::RecordedHosts>> hosts = hosts::read_hosts_of(file, trace->info());
         if (!hosts) {
           progress_.clear();
           console_.note(hosts.error());
           return false;
         }
         if (*hosts && !any) group.set_hosts({std::move((*hosts)->document), (*hosts)->missed, (*hosts)->unknown});
-        group.add(fs::path(file).parent_path().string(), *trace, *kernel ? &**kernel : nullptr);
+        const Result<void> added =
+            group.add(fs::path(file).parent_path().string(), *trace, *kernel ? &**kernel : nullptr);
+        if (!added) {
+          progress_.clear();
+          console_.note(added.error());
+          return false;
+        }
         any = true;
         ++done;
       }
-      if (any) groups_.push_back(std::move(group));
+      if (!any) continue;
+      group.finish();
+      groups_.push_back(std::move(group));
     }
     // A single group is labelled by its executor instead of its path.
     if (groups_.size() == 1) groups_.front().set_label(groups_.front().info().executor);

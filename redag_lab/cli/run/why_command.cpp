@@ -4,13 +4,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
+#include <charconv>
 #include <memory>
 #include <optional>
+#include <system_error>
+#include <utility>
 
 #include "redag/base/nearest.hpp"
 #include "redag/base/text.hpp"
-#include "redag/trace/events_file.hpp"
+#include "redag/trace/recording.hpp"
 #include "redag_lab/cli/run/why_report.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/files.hpp"
@@ -36,54 +38,54 @@ class Explaining {
   Explaining(const WhyOptions &options, Console &console) : options_(options), console_(console) {}
 
   int run() {
-    const std::optional<trace::Trace> trace = read();
-    if (!trace) return kExitBad;
-    if (trace->info.lost_events > 0) {
-      console_.warn(fmt::format("{} events of this run were lost: explanations can be wrong",
-                                format_count(trace->info.lost_events)));
-    }
-    if (kernel_ && kernel_->lost > 0) {
-      console_.warn(fmt::format("the kernel dropped {} of its events: other programs can be missing",
-                                format_count(kernel_->lost)));
-    }
-    const metrics::Investigation investigation(*trace, kernel_ ? &*kernel_ : nullptr);
-    return options_.job.empty() ? explain_run(investigation) : explain_job(investigation);
+    const Result<int> explained = explain();
+    if (explained) return *explained;
+    console_.note(explained.error());
+    return kExitBad;
   }
 
  private:
-  std::optional<trace::Trace> read() {
+  Result<int> explain() {
     const Result<std::string> file = find_trace(options_.place);
-    if (!file) {
-      console_.note(file.error());
-      return std::nullopt;
+    if (!file) return tl::unexpected<Diagnostics>(file.error());
+    const Result<trace::Recording> trace = trace::Recording::open(*file);
+    if (!trace) return tl::unexpected<Diagnostics>(trace.error());
+    const Result<std::optional<metrics::KernelRecord>> kernel = metrics::read_kernel_record_of(*file, trace->info());
+    if (!kernel) return tl::unexpected<Diagnostics>(kernel.error());
+    if (trace->info().lost_events > 0) {
+      console_.warn(fmt::format("{} events of this run were lost: explanations can be wrong",
+                                format_count(trace->info().lost_events)));
     }
-    Result<trace::Trace> trace = trace::read_trace(*file);
-    if (!trace) {
-      console_.note(trace.error());
-      return std::nullopt;
+    if (*kernel && (*kernel)->lost > 0) {
+      console_.warn(fmt::format("the kernel dropped {} of its events: other programs can be missing",
+                                format_count((*kernel)->lost)));
     }
-    Result<std::optional<metrics::KernelRecord>> kernel = metrics::read_kernel_record_of(*file, trace->info);
-    if (!kernel) {
-      console_.note(kernel.error());
-      return std::nullopt;
-    }
-    kernel_ = *std::move(kernel);
-    return *std::move(trace);
+    const Result<metrics::Investigation> investigation =
+        metrics::Investigation::of(*trace, *kernel ? &**kernel : nullptr, kMostExplained);
+    if (!investigation) return tl::unexpected<Diagnostics>(investigation.error());
+    return options_.job.empty() ? explain_run(*investigation) : explain_job(*investigation);
   }
 
-  int explain_run(const metrics::Investigation &investigation) {
-    std::vector<metrics::Subject> subjects = investigation.misses();
+  Result<int> explain_run(const metrics::Investigation &investigation) {
+    const std::vector<metrics::Subject> subjects =
+        investigation.misses().empty() ? investigation.closest(kClosest) : investigation.misses();
     WhyOverview overview;
-    overview.misses = subjects.size();
+    overview.misses = investigation.missed();
     overview.jobs = investigation.counted();
-    if (subjects.empty()) subjects = investigation.closest(kClosest);
-    subjects.resize(std::min(subjects.size(), kMostExplained));
-    overview.explanations = investigation.explain(subjects);
+    overview.explained = subjects.size();
+    overview.explanations.resize(options_.all || options_.json ? subjects.size() : std::min(kRows, subjects.size()));
+    metrics::CulpritCount causes;
+    const Result<void> explained = investigation.explain(subjects, [&](std::size_t rank, metrics::Explanation one) {
+      causes.add(one);
+      if (rank < overview.explanations.size()) overview.explanations[rank] = std::move(one);
+    });
+    if (!explained) return tl::unexpected<Diagnostics>(explained.error());
+    overview.causes = causes.sorted();
     if (options_.json) {
       console_.print(to_text(to_json(overview, investigation.run())));
       return kExitOk;
     }
-    console_.say(describe(overview, investigation.run(), console_.out_traits(), options_.all ? 0 : kRows));
+    console_.say(describe(overview, investigation.run(), console_.out_traits()));
     if (overview.explanations.empty()) return kExitOk;
     const metrics::JobRecord &worst = overview.explanations.front().job;
     console_.say(fmt::format("'redag why {} {}#{}' explains one job\n", options_.place,
@@ -91,15 +93,23 @@ class Explaining {
     return kExitOk;
   }
 
-  int explain_job(const metrics::Investigation &investigation) {
-    std::optional<metrics::Subject> subject = find(investigation);
-    if (!subject) return kExitBad;
-    if (options_.end_to_end) subject->end_to_end = true;
+  Result<int> explain_job(const metrics::Investigation &investigation) {
+    const Result<std::optional<metrics::Subject>> found = find(investigation);
+    if (!found) return tl::unexpected<Diagnostics>(found.error());
+    if (!*found) return kExitBad;
+    metrics::Subject subject = **found;
+    if (options_.end_to_end) subject.end_to_end = true;
+    Result<std::vector<metrics::Explanation>> explained = investigation.explain({&subject, 1});
+    if (!explained) return tl::unexpected<Diagnostics>(std::move(explained.error()));
     WhyOverview overview;
-    overview.explanations = investigation.explain(std::vector{*subject});
+    overview.explanations = *std::move(explained);
     const metrics::Explanation &one = overview.explanations.front();
+    overview.explained = 1;
     overview.misses = one.miss == metrics::Miss::None ? 0 : 1;
     overview.jobs = 1;
+    metrics::CulpritCount causes;
+    causes.add(one);
+    overview.causes = causes.sorted();
     if (options_.json) {
       console_.print(to_text(to_json(overview, investigation.run())));
     } else {
@@ -108,50 +118,41 @@ class Explaining {
     return kExitOk;
   }
 
-  // Returns the job that the user names: "dag.task#12", or "dag.task" for the worst one of the task.
-  std::optional<metrics::Subject> find(const metrics::Investigation &investigation) {
+  // Returns the job that the user names: "dag.task#12", or "dag.task" for the worst one of the task. Without one, says
+  // why.
+  Result<std::optional<metrics::Subject>> find(const metrics::Investigation &investigation) {
     const std::size_t mark = options_.job.rfind('#');
     const std::string name = options_.job.substr(0, mark);
     std::vector<std::string> names;
     const std::size_t count = investigation.run().workload.task_count();
     for (std::size_t t = 0; t < count; ++t) names.push_back(trace::task_name(investigation.run().workload, TaskId(t)));
-    const auto found = std::find(names.begin(), names.end(), name);
-    if (found == names.end()) {
+    const auto known = std::find(names.begin(), names.end(), name);
+    if (known == names.end()) {
       console_.error(fmt::format("there is no task {} in this run", in_quotes(name)), suggestion(name, names));
       return std::nullopt;
     }
-    const TaskId task(static_cast<std::size_t>(found - names.begin()));
-    const auto is_of_task = [&](const metrics::Subject &one) { return investigation.jobs()[one.job].task == task; };
+    const TaskId task(static_cast<std::size_t>(known - names.begin()));
     if (mark == std::string::npos) {
-      for (const auto &subjects : {investigation.misses(), investigation.closest(count)}) {
-        const auto worst = std::find_if(subjects.begin(), subjects.end(), is_of_task);
-        if (worst != subjects.end()) return *worst;
-      }
-      console_.error(fmt::format("no job of {} has ended in this run", name));
-      return std::nullopt;
+      const std::optional<metrics::Subject> worst = investigation.worst_of(task);
+      if (!worst) console_.error(fmt::format("no job of {} has ended in this run", name));
+      return worst;
     }
-    const std::string number = options_.job.substr(mark + 1);
-    for (std::size_t i = 0; i < investigation.jobs().size(); ++i) {
-      if (!is_of_task({i, false}) || std::to_string(investigation.jobs()[i].number) != number) continue;
-      return metrics::Subject{i, investigation.miss(i) == metrics::Miss::EndToEnd};
+    const std::string text = options_.job.substr(mark + 1);
+    std::uint32_t number = 0;
+    const auto [end, mistake] = std::from_chars(text.data(), text.data() + text.size(), number);
+    const bool is_number = mistake == std::errc() && std::to_string(number) == text;
+    Result<std::optional<metrics::Subject>> found =
+        is_number ? investigation.find({task, number}) : Result<std::optional<metrics::Subject>>(std::nullopt);
+    if (found && !*found) {
+      console_.error(
+          fmt::format("{} has no job {} in this run", name, in_quotes(text)),
+          fmt::format("its jobs are 0 to {}; '{}' alone is its worst one", investigation.last_number(task), name));
     }
-    console_.error(
-        fmt::format("{} has no job {} in this run", name, in_quotes(number)),
-        fmt::format("its jobs are 0 to {}; '{}' alone is its worst one", last_of(investigation, task), name));
-    return std::nullopt;
-  }
-
-  static std::uint32_t last_of(const metrics::Investigation &investigation, TaskId task) {
-    std::uint32_t last = 0;
-    for (const metrics::JobRecord &job : investigation.jobs()) {
-      if (job.task == task) last = std::max(last, job.number);
-    }
-    return last;
+    return found;
   }
 
   const WhyOptions &options_;
   Console &console_;
-  std::optional<metrics::KernelRecord> kernel_;
 };
 
 }  // namespace

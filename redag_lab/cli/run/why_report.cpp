@@ -120,9 +120,8 @@ std::string describe(const Explanation &one, const trace::RunInfo &run, const St
   return text;
 }
 
-std::string describe(const WhyOverview &overview, const trace::RunInfo &run, const StreamTraits &terminal,
-                     std::size_t most) {
-  const std::size_t count = overview.explanations.size();
+std::string describe(const WhyOverview &overview, const trace::RunInfo &run, const StreamTraits &terminal) {
+  const std::size_t count = overview.explained;
   const std::string headline =
       overview.misses == 0
           ? std::string("no deadline was missed; the jobs that came closest:")
@@ -130,13 +129,12 @@ std::string describe(const WhyOverview &overview, const trace::RunInfo &run, con
   std::string text = tinted(headline, overview.misses == 0 ? Tint::Good : Tint::Bad, terminal.colour) + "\n";
   if (overview.misses > count) text += fmt::format("(explained: the worst {})\n", format_count(count));
   if (count == 0) return text;
-  text += "\n" + causes_table(metrics::culprits_of(overview.explanations), run, terminal) + "\n";
+  text += "\n" + causes_table(overview.causes, run, terminal) + "\n";
   Table table({{"job", false, 9},
                {"late or lost", true, 8},
                {.title = "main cause", .importance = 7, .prose = true},
                {"share", true, 6}});
-  for (std::size_t i = 0; i < count && (most == 0 || i < most); ++i) {
-    const Explanation &one = overview.explanations[i];
+  for (const Explanation &one : overview.explanations) {
     const std::vector<Culprit> culprits = metrics::culprits_of(one.parts);
     table.add({{metrics::job_name(run.workload, id_of(one))},
                {lateness(one), tint_of(one)},
@@ -144,16 +142,14 @@ std::string describe(const WhyOverview &overview, const trace::RunInfo &run, con
                {culprits.empty() ? "-" : format_percent(share_of(culprits.front().time, one.length()))}});
   }
   text += table.render(terminal.width, terminal.colour);
-  if (most > 0 && count > most)
-    text += fmt::format("(the worst {} of {}; --all shows all)\n", most, format_count(count));
+  const std::size_t shown = overview.explanations.size();
+  if (shown < count) text += fmt::format("(the worst {} of {}; --all shows all)\n", shown, format_count(count));
   return text;
 }
 
 Json to_json(const WhyOverview &overview, const trace::RunInfo &run) {
   Json causes = Json::array();
-  for (const Culprit &cause : metrics::culprits_of(overview.explanations)) {
-    causes.push_back(to_json(cause, run.workload));
-  }
+  for (const Culprit &cause : overview.causes) causes.push_back(to_json(cause, run.workload));
   Json jobs = Json::array();
   for (const Explanation &one : overview.explanations) jobs.push_back(to_json(one, run));
   return Json{{"format", "redag.why/1"},   {"workload", run.workload.name}, {"executor", run.executor},

@@ -4,7 +4,7 @@
 // Presents explanations (redag_analysis/metrics/why.hpp) on the terminal and as JSON. Pure.
 #pragma once
 
-#include <span>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -16,18 +16,20 @@ namespace redag::cli {
 
 /// The explanations of a whole run: of its misses, or without any of the jobs closest to their deadlines.
 struct WhyOverview {
-  std::vector<metrics::Explanation> explanations;  // the worst first
-  std::size_t misses = 0;                          // in all; not all need to be explained
-  std::size_t jobs = 0;                            // released, those of the warm-up left out
+  std::vector<metrics::Explanation> explanations;  // to be shown; the worst first
+  std::vector<metrics::Culprit> causes;            // of all that were explained
+  std::size_t explained = 0;
+  std::uint64_t misses = 0;  // in all; not all need to be explained
+  std::uint64_t jobs = 0;    // released, those of the warm-up left out
 };
 
 /// Returns one job's parts in `most` lines (0: one for each part), and what they sum to.
 [[nodiscard]] std::string describe(const metrics::Explanation &explanation, const trace::RunInfo &run,
                                    const StreamTraits &terminal, std::size_t most);
 
-/// Returns the causes of a whole run and a table of its misses, of which `most` rows are shown (0: all).
-[[nodiscard]] std::string describe(const WhyOverview &overview, const trace::RunInfo &run, const StreamTraits &terminal,
-                                   std::size_t most);
+/// Returns the causes of a whole run and a table of its misses.
+[[nodiscard]] std::string describe(const WhyOverview &overview, const trace::RunInfo &run,
+                                   const StreamTraits &terminal);
 
 /// Returns the document "redag.why/1" (docs/results_format.md).
 [[nodiscard]] Json to_json(const WhyOverview &overview, const trace::RunInfo &run);
