@@ -99,7 +99,7 @@ void Lockstep::look() {
   if (follows_) refresh();
   if (state_ == State::Gathering && missing().empty()) start_instant();
   if (state_ == State::Running && quiet_) end_instant();
-  warn_of_outside();
+  warn_without_player();
 
   const Time now = parts_.engine.now();
   next_look_ = kNever;
@@ -317,23 +317,29 @@ void Lockstep::ran(const Callback &callback) {
 // ---- reports ----
 
 void Lockstep::came_from_outside(const Callback &callback) {
-  if (!follows_) {
-    if (!came_free_.exchange(true)) parts_.wake();
-    return;
-  }
   const redag::LockGuard guard(outside_lock_);
+  if (!follows_) {
+    if (came_free_.exchange(true)) return;
+    first_free_ = to_string(callback.id());
+    return parts_.wake();
+  }
   ++outside_[to_string(callback.id())];
 }
 
-void Lockstep::warn_of_outside() {
+void Lockstep::warn_without_player() {
   if (state_ != State::Free || warned_free_) return;
   const bool alone = parts_.engine.now() - since_ >= kLookForPlayer;
   if (!came_free_ && !alone) return;
   warned_free_ = true;
+  std::string why = "none has come within 5 s";
+  if (came_free_) {
+    const redag::LockGuard guard(outside_lock_);
+    why = fmt::format("{} is to run", first_free_);
+  }
   RCLCPP_WARN(logger(),
               "lockstep without a player: %s. Callbacks run as messages and /clock come, and their order is not "
               "reproducible. Play the recording with: ros2 run redag_rclcpp_lab play_lockstep BAG",
-              came_free_ ? "something else than a player publishes messages or /clock" : "none has come within 5 s");
+              why.c_str());
 }
 
 void Lockstep::report(Report::Kind kind, std::string text) {

@@ -82,7 +82,7 @@ class Lockstep {
   [[nodiscard]] std::string missing() const;
   void start_instant();
   void end_instant();
-  void warn_of_outside();
+  void warn_without_player();
   void report(Report::Kind kind, std::string text = {});
   void fail(const std::string &text);
   void set_state(State state);
@@ -119,6 +119,7 @@ class Lockstep {
   std::atomic<bool> came_free_{false};  // something came from outside while no player was followed
 
   mutable redag::PiMutex outside_lock_;
+  std::string first_free_ REDAG_GUARDED_BY(outside_lock_);                        // see came_free_
   std::map<std::string, std::uint64_t> outside_ REDAG_GUARDED_BY(outside_lock_);  // by callback
 };
 

@@ -8,6 +8,7 @@
 #include "compat.hpp"
 #include "rclcpp/subscription.hpp"
 #include "rclcpp/time.hpp"
+#include "rmw/rmw.h"
 #include "rosgraph_msgs/msg/clock.hpp"
 
 namespace redag_rclcpp {
@@ -41,6 +42,8 @@ bool NodeClocks::hold(const std::vector<rclcpp::node_interfaces::NodeBaseInterfa
 
 void NodeClocks::set(redag::Time time) {
   rclcpp::MessageInfo info;
+  rclcpp::MessageInfo own;  // of a publisher that nobody knows
+  own.get_rmw_message_info().publisher_gid.implementation_identifier = rmw_get_implementation_identifier();
   for (const Held &held : held_) {
     const auto subscription = held.subscription.lock();
     if (!subscription) continue;
@@ -48,7 +51,7 @@ void NodeClocks::set(redag::Time time) {
     while (subscription->take_type_erased(message.get(), info)) {
     }
     static_cast<Clock *>(message.get())->clock = rclcpp::Time(time, RCL_ROS_TIME);
-    subscription->handle_message(message, rclcpp::MessageInfo());
+    subscription->handle_message(message, own);
     subscription->return_message(message);
   }
 }
