@@ -70,8 +70,6 @@ void ArrivalCallback::arrived(std::size_t count, Source source, int part, bool s
     if (held) {
       paced_arrivals_ += count;
       to_pace = context();
-    } else if (from_outside) {
-      lockstep()->came_from_outside(*this);
     }
     const Time turn = lockstep() == nullptr ? now : lockstep()->turn();
     const Time origin = origin_of(turn, publisher);
@@ -96,6 +94,7 @@ void ArrivalCallback::arrived(std::size_t count, Source source, int part, bool s
                          .part = part,
                          .seen_only = seen_only,
                          .held = held,
+                         .from_outside = from_outside && !held,
                          .sender = publisher == nullptr ? redag::JobSlot() : publisher->slot});
       ++kept_[index_of(source)];
     }
@@ -409,6 +408,8 @@ bool ArrivalCallback::execute_token(const Token &token) {
   Taking taking(*this, token.source);
   if (token.after_skipped) drop_skipped(token.source);
   const bool taken = handle(token, taking);
+  // There are arrivals without a message, for instance when a publisher goes.
+  if (taken && token.from_outside) lockstep()->came_from_outside(*this);
   bool more = false;
   // This job has lowered kept_ and now reads leftovers_. release_leftovers() sets leftovers_ and then reads kept_. At
   // least one of them sees what the other wrote.

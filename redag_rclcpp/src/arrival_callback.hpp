@@ -56,6 +56,7 @@ class ArrivalCallback : public Callback, public Hooked {
     bool seen_only = false;      // the wait set saw it, no hook
     bool after_skipped = false;  // set by take_token(): drop messages of skipped jobs first
     bool held = false;           // in lockstep: waits for begin_instant()
+    bool from_outside = false;   // in lockstep: see Lockstep::came_from_outside()
     redag::JobSlot sender;       // the job on whose thread it arrived, if any
   };
 

@@ -184,6 +184,10 @@ void Lockstep::begin(const Order &order) {
   const std::string lacking = unconnected();
   if (lacking.empty()) {
     connected_ = true;
+    // What has arrived until now, was for instance the end of an earlier player's publishers.
+    if (state_ == State::Connecting) {
+      for (const auto &callback : paced_) callback->pace(true, 0);
+    }
     set_state(State::Between);
   }
   report(lacking.empty() ? Report::Kind::Ready : Report::Kind::Connecting, lacking);
@@ -234,12 +238,12 @@ std::string Lockstep::unconnected() const {
           to_string(callback->id()), topic);
     }
     const auto known = node_->get_publishers_info_by_topic(topic);
-    const bool has_player = std::any_of(known.begin(), known.end(),
-                                        [&](const auto &one) { return one.node_name() == order_.player; });
-    if (!has_player || paced->publishers < known.size()) {
-      return fmt::format("{} is connected to {} of {} publishers{} (if this stays, their QoS is not compatible)",
-                         to_string(callback->id()), paced->publishers, known.size(),
-                         has_player ? "" : ", and does not know the player");
+    const auto players = std::count_if(known.begin(), known.end(),
+                                       [&](const auto &one) { return one.node_name() == order_.player; });
+    if (players != 1 || paced->publishers < known.size()) {
+      return fmt::format("{} is connected to {} of {} publishers, {} of them players (if this stays, their QoS is not "
+                         "compatible, or there is another player)",
+                         to_string(callback->id()), paced->publishers, known.size(), players);
     }
   }
   return {};

@@ -6,8 +6,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <sqlite3.h>
+
 #include <atomic>
 #include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
 #include <memory>
 #include <mutex>
 #include <random>
@@ -15,6 +20,7 @@
 #include <thread>
 #include <vector>
 
+#include "bag_recording.hpp"
 #include "lockstep_player.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "rclcpp/serialization.hpp"
@@ -70,6 +76,58 @@ class RandomRecording final : public Recording {
   std::vector<RecordedTopic> topics_;
   std::vector<RecordedMessage> messages_;
   std::size_t at_ = 0;
+};
+
+/// Writes a recording as rosbag2 does, to a folder of its own.
+class WrittenBag {
+ public:
+  explicit WrittenBag(RandomRecording recording) {
+    std::string name = (std::filesystem::temp_directory_path() / "redag_bag_XXXXXX").string();
+    folder_ = mkdtemp(name.data());
+    EXPECT_EQ(sqlite3_open((folder_ / "bag_0.db3").c_str(), &database_), SQLITE_OK);
+    execute(
+        "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT, "
+        "offered_qos_profiles TEXT);"
+        "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB);"
+        "INSERT INTO topics VALUES(9, '/clock', 'rosgraph_msgs/msg/Clock', 'cdr', '');");
+    int id = 0;
+    for (const RecordedTopic &topic : recording.topics()) {
+      ++id;
+      execute("INSERT INTO topics VALUES(" + std::to_string(id) + ", '" + topic.name + "', '" + topic.type +
+              "', 'cdr', '- history: keep_last\n  durability: " + (id == 1 ? "transient_local" : "volatile") + "\n');");
+    }
+    execute("BEGIN");
+    sqlite3_stmt *insert = nullptr;
+    sqlite3_prepare_v2(database_, "INSERT INTO messages(topic_id, timestamp, data) VALUES(?, ?, ?)", -1, &insert,
+                       nullptr);
+    RecordedMessage message;
+    while (*recording.next(message)) {
+      const rcl_serialized_message_t &data = message.data.get_rcl_serialized_message();
+      sqlite3_bind_int64(insert, 1, static_cast<std::int64_t>(message.topic) + 1);
+      sqlite3_bind_int64(insert, 2, message.time);
+      sqlite3_bind_blob(insert, 3, data.buffer, static_cast<int>(data.buffer_length), SQLITE_TRANSIENT);
+      EXPECT_EQ(sqlite3_step(insert), SQLITE_DONE);
+      sqlite3_reset(insert);
+    }
+    sqlite3_finalize(insert);
+    execute("COMMIT");
+    sqlite3_close(database_);
+  }
+  ~WrittenBag() { std::filesystem::remove_all(folder_); }
+
+  [[nodiscard]] const std::filesystem::path &folder() const { return folder_; }
+  void write(const char *name, const std::string &text) const { std::ofstream(folder_ / name) << text; }
+  [[nodiscard]] std::string read(const char *name) const {
+    std::ifstream file(folder_ / name);
+    return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  }
+
+ private:
+  void execute(const std::string &text) {
+    EXPECT_EQ(sqlite3_exec(database_, text.c_str(), nullptr, nullptr, nullptr), SQLITE_OK) << sqlite3_errmsg(database_);
+  }
+  std::filesystem::path folder_;
+  sqlite3 *database_ = nullptr;
 };
 
 /// What callbacks did: one line each, with the time of their node's clock, what they took and what they published.
@@ -302,6 +360,71 @@ TEST_P(LockstepReplays, HaveTheSameOrderAndOutputs) {
 INSTANTIATE_TEST_SUITE_P(Transport, LockstepReplays, testing::Bool(),
                          [](const auto &given) { return given.param ? "InProcess" : "Middleware"; });
 
+// The program plays a bag to an executor of another process, which stays for all replays.
+TEST_F(Lockstep, AProgramReplaysABag) {
+  const std::uint64_t replays = number_of("REDAG_REPLAYS", 3);
+  const Load load;
+  const WrittenBag bag(RandomRecording(60));
+  Robot robot;
+  ReDAGExecutor executor(options());
+  robot.add_to(executor);
+  const Spinner spinner(executor);
+  std::string first;
+  std::uint64_t differ = 0;
+  // In the first replay the clocks begin at 0, and timers of the robot have no grid yet.
+  for (std::uint64_t i = 0; i <= replays; ++i) {
+    const std::string command = std::string(PLAYER) + " " + bag.folder().string() + " --log " +
+                                (bag.folder() / "log").string() + (i % 2 == 0 ? "" : " --shuffle 5") + " > " +
+                                (bag.folder() / "out").string() + " 2>&1";
+    ASSERT_EQ(std::system(command.c_str()), 0) << bag.read("out");
+    if (i == 0) continue;
+    if (i == 1) {
+      first = bag.read("log");
+      EXPECT_THAT(bag.read("out"), HasSubstr("of the recording in"));
+    }
+    if (bag.read("log") != first) ++differ;
+  }
+  EXPECT_GT(first.size(), 1000U);
+  EXPECT_EQ(differ, 0U);
+  std::cout << replays << " replays, " << differ << " differ; " << bag.read("out");
+}
+
+TEST(LockstepBag, IsReadOrRefused) {
+  const WrittenBag bag(RandomRecording(5));
+  const auto whole = open_bag(bag.folder().string(), {});
+  ASSERT_TRUE(whole) << to_string(whole.error());
+  ASSERT_EQ((*whole)->topics().size(), 3U);  // without /clock
+  for (const RecordedTopic &topic : (*whole)->topics()) EXPECT_EQ(topic.latched, topic.name == "/scan");
+  RandomRecording expected(5);
+  RecordedMessage one;
+  RecordedMessage other;
+  while (*expected.next(one)) {
+    ASSERT_TRUE(*(*whole)->next(other));
+    EXPECT_EQ(one.time, other.time);
+    EXPECT_EQ(expected.topics()[one.topic].name, (*whole)->topics()[other.topic].name);
+    EXPECT_EQ(one.data.size(), other.data.size());
+  }
+  EXPECT_FALSE(*(*whole)->next(other));
+  ASSERT_TRUE((*whole)->rewind());
+  EXPECT_TRUE(*(*whole)->next(other));
+
+  EXPECT_EQ((*open_bag((bag.folder() / "bag_0.db3").string(), {"/imu"}))->topics().size(), 1U);
+  const auto refusal = [](const std::string &path, const std::set<std::string> &topics = {}) {
+    const auto opened = open_bag(path, topics);
+    return opened ? std::string("opened") : to_string(opened.error());
+  };
+  EXPECT_THAT(refusal(bag.folder().string(), {"/map"}), HasSubstr("has no topic '/map'"));
+  EXPECT_THAT(refusal("/nowhere"), HasSubstr("there is no bag '/nowhere'"));
+  bag.write("metadata.yaml", "rosbag2_bagfile_information:\n  compression_mode: FILE\n");
+  EXPECT_THAT(refusal(bag.folder().string()), HasSubstr("is compressed"));
+  bag.write("metadata.yaml", "");
+  bag.write("bag_1.db3", "this is no database, but long enough to be looked at as one");
+  EXPECT_THAT(refusal(bag.folder().string()), HasSubstr("bag_1.db3: cannot read"));
+  std::filesystem::remove(bag.folder() / "bag_0.db3");
+  std::filesystem::remove(bag.folder() / "bag_1.db3");
+  EXPECT_THAT(refusal(bag.folder().string()), HasSubstr("ros2 bag convert"));
+}
+
 // Each callback sees the time of its instant, also where the clock jumps back.
 TEST_F(Lockstep, ClocksShowTheInstantAndJumpBack) {
   Robot robot;
@@ -353,6 +476,39 @@ TEST_F(Lockstep, WhatComesFromOutsideIsReported) {
   ASSERT_EQ(outside.count("/wall subscription /stranger"), 1U);
   EXPECT_EQ(outside.at("/wall subscription /stranger"), 1U);
   EXPECT_EQ(outside.size(), 2U);
+}
+
+TEST_F(Lockstep, TwoExecutorsGoTogether) {
+  std::string first;
+  for (std::uint64_t i = 0; i < 3; ++i) {
+    Robot robot;
+    Record of_other;
+    const auto other = robot.node("other");
+    const auto subscription = other->create_subscription<UInt64>(
+        "/imu", 10, [&](const UInt64 &message) { of_other.add(*other, "/imu", message.data); });
+    const auto timer = other->create_timer(30ms, [&] { of_other.add(*other, "timer"); });
+    ReDAGExecutor one(options());
+    ReDAGExecutor two(options());
+    robot.add_to(one);
+    two.add_node(other);
+    const Spinner spins_one(one);
+    const Spinner spins_two(two);
+    PlayOptions how = play(i);
+    how.executors = 2;
+    RandomRecording recording(40);
+    LockstepPlayer player(player_node(), how);
+    const auto result = player.play(recording);
+    ASSERT_TRUE(result) << to_string(result.error());
+    EXPECT_EQ(result->executors.size(), 2U);
+    for (const auto &[name, follower] : result->executors) EXPECT_THAT(follower.report.outside, testing::IsEmpty());
+    std::string all;
+    for (const Record *record : {&robot.record, &of_other}) {
+      for (const std::string &line : record->lines()) all += line + "\n";
+    }
+    EXPECT_THAT(all, HasSubstr("other /imu"));
+    if (i == 0) first = all;
+    EXPECT_EQ(all, first);
+  }
 }
 
 TEST_F(Lockstep, ASubscriptionMadeByACallbackGetsTheNextMessages) {
