@@ -6,7 +6,8 @@
 // (release timer, rclcpp) and provide the bodies.
 //
 // Threads: any thread, also a body, may call any member but start(), join(), run_one(), drain(), end_started(),
-// wait_idle(), wait_quiet() and wait_paused(). drain() is for one thread at a time. halt() is async-signal-safe. No body has a lock.
+// wait_idle(), wait_quiet() and wait_paused(). drain() is for one thread at a time. halt() is async-signal-safe. No
+// body has a lock.
 #pragma once
 
 #include <atomic>

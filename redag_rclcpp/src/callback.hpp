@@ -82,9 +82,7 @@ class Callback : public TimerQueue::Timer,
   // ---- in lockstep ----
 
   /// Messages of a player wait for begin_instant() from now on, or no longer. `arrived`: how many count as arrived.
-  virtual void pace(bool paced, std::uint64_t arrived) {
-    (void)paced, (void)arrived;
-  }
+  virtual void pace(bool paced, std::uint64_t arrived) { (void)paced, (void)arrived; }
   /// How a callback whose messages a player publishes stands.
   struct Paced {
     std::uint64_t arrived = 0;   // messages of the player
@@ -110,17 +108,14 @@ class Callback : public TimerQueue::Timer,
 
  protected:
   Callback(std::shared_ptr<ExecutorContext> context, redag::CallbackId id)
-      : id_(std::move(id)),
-        engine_(context->engine()),
-        lockstep_(context->lockstep()),
-        context_(std::move(context)) {}
+      : id_(std::move(id)), engine_(context->engine()), lockstep_(context->lockstep()), context_(std::move(context)) {}
 
   /// Leaves the executor, as part of detach(). The caller destroys the result without a lock.
   [[nodiscard]] std::shared_ptr<ExecutorContext> leave() REDAG_REQUIRES(lock_);
   void count_late() { late_.fetch_add(1, std::memory_order_relaxed); }
   [[nodiscard]] redag::runtime::Engine &engine() const { return engine_; }
-  /// Null unless callbacks run in lockstep. As the engine, it can be used by jobs, and by others under lock_ while there
-  /// is a context.
+  /// Null unless callbacks run in lockstep. As the engine, it can be used by jobs, and by others under lock_ while
+  /// there is a context.
   [[nodiscard]] Lockstep *lockstep() const { return lockstep_; }
   [[nodiscard]] Duration deadline() const { return deadline_.load(std::memory_order_relaxed); }
 

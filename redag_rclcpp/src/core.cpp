@@ -111,7 +111,9 @@ ReDAGExecutor::Core::Core(const rclcpp::Context::SharedPtr &context, ReDAGOption
   if (options_.lockstep) {
     lockstep_ = std::make_unique<Lockstep>(
         context_, origin_,
-        Lockstep::Parts{.engine = *engine_, .registry = registry_, .wake = [this] { keeper_parker_.unpark(); },
+        Lockstep::Parts{.engine = *engine_,
+                        .registry = registry_,
+                        .wake = [this] { keeper_parker_.unpark(); },
                         .name_of = [this](redag::TaskId task) { return tasks_.name_of(task); }});
   }
   engine_->share_releases(timer_.thread());
@@ -391,9 +393,8 @@ void ReDAGExecutor::Core::keep_house(RaisedMiddleware *middleware) {
       look_for_deadlocks_at_ = now + DeadlockDetector::kInterval;
     }
     if (now >= look_for_deadlocks_at_) look_for_deadlocks();
-    const redag::Time next =
-        std::min({report_unmatched_at_, look_at_middleware_at_, look_for_deadlocks_at_,
-                  learning_ ? learn_until_ : kNever, lockstep_ ? lockstep_->next_look() : kNever});
+    const redag::Time next = std::min({report_unmatched_at_, look_at_middleware_at_, look_for_deadlocks_at_,
+                                       learning_ ? learn_until_ : kNever, lockstep_ ? lockstep_->next_look() : kNever});
     if (lockstep_ && lockstep_->in_instant()) {
       lockstep_->wait(next);
     } else if (next == kNever) {

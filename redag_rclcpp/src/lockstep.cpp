@@ -22,9 +22,10 @@ using redag::kSecond;
 
 namespace {
 
-constexpr Duration kPatience = 10 * kSecond;     // with messages that the player has published
-constexpr Duration kSignOfLife = kSecond;        // between reports while an instant lasts
-constexpr Duration kLookForPlayer = 5 * kSecond;  // after the start: until the warning that there is no player
+constexpr Duration kPatience = 10 * kSecond;  // with messages that the player has published
+constexpr Duration kSignOfLife = kSecond;     // between reports while an instant lasts
+// After the start, until the warning that there is no player; then between looks whether there still is one.
+constexpr Duration kLookForPlayer = 5 * kSecond;
 
 rclcpp::Logger logger() { return rclcpp::get_logger("redag_rclcpp.lockstep"); }
 
@@ -46,7 +47,11 @@ constexpr std::uint64_t kHashOfNothing = 0xcbf29ce484222325ULL;
 }  // namespace
 
 Lockstep::Lockstep(rclcpp::Context::SharedPtr context, Time origin, Parts parts)
-    : context_(std::move(context)), origin_(origin), parts_(std::move(parts)), clocks_(context_), name_(unique_name()) {}
+    : context_(std::move(context)),
+      origin_(origin),
+      parts_(std::move(parts)),
+      clocks_(context_),
+      name_(unique_name()) {}
 
 Lockstep::~Lockstep() { close(); }
 
@@ -69,8 +74,9 @@ void Lockstep::open() {
   orders_->set_on_new_message_callback([wake = parts_.wake](std::size_t) { wake(); });
   set_state(State::Free);
   next_look_ = since_ + kLookForPlayer;
-  RCLCPP_INFO(logger(), "lockstep: callbacks run one at a time, with one worker and without preemption, learning and "
-                        "budgets; waiting for a player");
+  RCLCPP_INFO(logger(),
+              "lockstep: callbacks run one at a time, with one worker and without preemption, learning and "
+              "budgets; waiting for a player");
 }
 
 void Lockstep::close() {
@@ -96,6 +102,10 @@ void Lockstep::set_state(State state) {
 
 void Lockstep::look() {
   take_orders();
+  // A player that was killed says no end.
+  if ((state_ == State::Connecting || state_ == State::Between) && orders_->get_publisher_count() == 0) {
+    end("the player has gone");
+  }
   if (follows_) refresh();
   if (state_ == State::Gathering && missing().empty()) start_instant();
   if (state_ == State::Running && quiet_) end_instant();
@@ -107,8 +117,8 @@ void Lockstep::look() {
     case State::Free:
       if (!warned_free_) next_look_ = since_ + kLookForPlayer;
       break;
-    case State::Connecting:  // the player repeats its order
-    case State::Between: break;
+    case State::Connecting:
+    case State::Between: next_look_ = now + kLookForPlayer; break;
     case State::Gathering:
       if (now - since_ >= kPatience) return fail(missing());
       next_look_ = told_ + kSignOfLife;
@@ -156,7 +166,8 @@ void Lockstep::obey(const Order &order) {
   if (order.kind == Order::Kind::End) return end("the player has ended");
   if (order.instant != order_.instant + 1 || state_ != State::Between) {
     order_.instant = order.instant;
-    return fail(fmt::format("instant {} was announced in the place of the one after {}", order.instant, order_.instant));
+    return fail(
+        fmt::format("instant {} was announced in the place of the one after {}", order.instant, order_.instant));
   }
   order_ = order;
   for (const auto &[topic, number] : order.published) published_[topic] = number;
@@ -217,6 +228,7 @@ void Lockstep::refresh() {
   paced_.clear();
   for (const auto &callback : callbacks_) {
     if (callback->id().kind != redag::Callback::Kind::Subscription) continue;
+    if (callback->id().name == "/clock") came_from_outside(*callback);  // of a node with use_clock_thread(false)
     const auto published = published_.find(callback->id().name);
     if (published == published_.end()) continue;
     if (!callback->paced()) callback->pace(true, published->second);
@@ -238,12 +250,13 @@ std::string Lockstep::unconnected() const {
           to_string(callback->id()), topic);
     }
     const auto known = node_->get_publishers_info_by_topic(topic);
-    const auto players = std::count_if(known.begin(), known.end(),
-                                       [&](const auto &one) { return one.node_name() == order_.player; });
+    const auto players =
+        std::count_if(known.begin(), known.end(), [&](const auto &one) { return one.node_name() == order_.player; });
     if (players != 1 || paced->publishers < known.size()) {
-      return fmt::format("{} is connected to {} of {} publishers, {} of them players (if this stays, their QoS is not "
-                         "compatible, or there is another player)",
-                         to_string(callback->id()), paced->publishers, known.size(), players);
+      return fmt::format(
+          "{} is connected to {} of {} publishers, {} of them players (if this stays, their QoS is not "
+          "compatible, or there is another player)",
+          to_string(callback->id()), paced->publishers, known.size(), players);
     }
   }
   return {};

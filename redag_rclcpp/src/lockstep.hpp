@@ -36,7 +36,7 @@ class Lockstep {
   struct Parts {
     redag::runtime::Engine &engine;
     Registry &registry;
-    std::function<void()> wake;                       // makes the thread that called spin() call look()
+    std::function<void()> wake;  // makes the thread that called spin() call look()
     std::function<std::string(redag::TaskId)> name_of;
   };
   Lockstep(rclcpp::Context::SharedPtr context, Time origin, Parts parts);
@@ -97,19 +97,19 @@ class Lockstep {
   rclcpp::Publisher<std_msgs::msg::String>::SharedPtr reports_;
 
   State state_ = State::Free;
-  Order order_;                                      // the player's last
-  std::map<std::string, std::uint64_t> published_;   // by the player, of all its topics
-  std::vector<std::shared_ptr<Callback>> paced_;     // subscriptions of these topics
-  std::vector<std::shared_ptr<Callback>> callbacks_; // all, in the order of names
-  std::uint64_t seen_change_ = ~std::uint64_t{0};    // of the registry
+  Order order_;                                       // the player's last
+  std::map<std::string, std::uint64_t> published_;    // by the player, of all its topics
+  std::vector<std::shared_ptr<Callback>> paced_;      // subscriptions of these topics
+  std::vector<std::shared_ptr<Callback>> callbacks_;  // all, in the order of names
+  std::uint64_t seen_change_ = ~std::uint64_t{0};     // of the registry
   bool clocks_held_ = false;
-  bool connected_ = false;   // callbacks have not changed since they all had the player
-  bool quiet_ = false;       // what wait() has seen
-  bool warned_free_ = false; // that callbacks run without a player
-  Time since_ = 0;           // of the state
-  Time told_ = 0;            // last report
+  bool connected_ = false;    // callbacks have not changed since they all had the player
+  bool quiet_ = false;        // what wait() has seen
+  bool warned_free_ = false;  // that callbacks run without a player
+  Time since_ = 0;            // of the state
+  Time told_ = 0;             // last report
   Time next_look_ = redag::kNever;
-  std::string said_;         // last text of a report that was logged
+  std::string said_;  // last text of a report that was logged
 
   std::atomic<bool> follows_{false};
   std::atomic<bool> running_{false};  // the state is Running

@@ -171,7 +171,8 @@ std::vector<Entity> Registry::find_all() {
     }
   }
 
-  // rclcpp's order is that of addresses. Names that are counted, and ties of priorities, have to be the same in each run.
+  // rclcpp's order is that of addresses. Names that are counted, and ties of priorities, have to be the same in each
+  // run.
   std::vector<std::pair<std::size_t, rclcpp::CallbackGroup::SharedPtr>> ordered;
   for (const auto &weak : groups) {
     const auto group = weak.lock();

@@ -33,8 +33,8 @@ using Statement = std::unique_ptr<sqlite3_stmt, Close>;
 struct File {
   std::string path;
   Database database;
-  redag::Time first = 0;                           // time of its first message
-  std::map<std::int64_t, std::size_t> topics{};    // index among the recording's topics, by id in the file
+  redag::Time first = 0;                         // time of its first message
+  std::map<std::int64_t, std::size_t> topics{};  // index among the recording's topics, by id in the file
 };
 
 tl::unexpected<redag::Diagnostics> error_of(const File &file, const std::string &what) {
@@ -57,7 +57,8 @@ std::string text_of(sqlite3_stmt *row, int column) {
 
 /// rosbag2 writes the QoS of the publishers as YAML, with numbers before Jazzy and with names since.
 bool is_latched(const std::string &qos) {
-  return qos.find("durability: 1\n") != std::string::npos || qos.find("durability: transient_local") != std::string::npos;
+  return qos.find("durability: 1\n") != std::string::npos ||
+         qos.find("durability: transient_local") != std::string::npos;
 }
 
 class Bag final : public Recording {

@@ -108,7 +108,11 @@ void LockstepPlayer::hear(const std::string &text) {
 
 // Waits until all executors are ready, and connected in both directions.
 Result<void> LockstepPlayer::connect() {
-  if (options_.executors == 0) return {};
+  if (options_.executors == 0) {
+    const Time until = monotonic_now() + kSecond;  // subscriptions appear
+    while (!options_.stop() && monotonic_now() < until) spinner_.spin_once(kLongestWait);
+    return {};
+  }
   Time say_at = monotonic_now() + kSecond;
   Time ready_at = redag::kNever;  // since when enough executors are
   for (;;) {
@@ -126,10 +130,9 @@ Result<void> LockstepPlayer::connect() {
       if (ready >= options_.executors && unmatched().empty()) break;
     }
     if (result_.executors.size() > options_.executors) {
-      return redag::make_error(
-          fmt::format("{} executors are in lockstep, and --executors says {}", result_.executors.size(),
-                      options_.executors),
-          "state their number, or stop those that do not belong to the replay");
+      return redag::make_error(fmt::format("{} executors are in lockstep, and --executors says {}",
+                                           result_.executors.size(), options_.executors),
+                               "state their number, or stop those that do not belong to the replay");
     }
     for (const auto &[name, follower] : result_.executors) {
       if (follower.report.kind != Report::Kind::Failed) continue;
@@ -299,16 +302,16 @@ Result<void> LockstepPlayer::check(std::uint32_t &done) {
   for (const auto &[name, follower] : result_.executors) {
     const Report &report = follower.report;
     if (report.kind == Report::Kind::Failed) {
-      return redag::make_error(fmt::format("executor {} has failed at instant {}: {}", name, report.instant, report.text));
+      return redag::make_error(
+          fmt::format("executor {} has failed at instant {}: {}", name, report.instant, report.text));
     }
     const bool is_done = report.kind == Report::Kind::Done && report.instant == order_.instant;
     if (is_done) ++done;
     if (now - follower.heard < options_.patience) continue;
     if (is_done) return redag::make_error(unmatched());
-    return redag::make_error(
-        fmt::format("executor {} has given no sign of life for {} in instant {}", name,
-                    redag::humanize_duration(options_.patience), order_.instant),
-        "its process has ended or stands still; executors that compute report each second");
+    return redag::make_error(fmt::format("executor {} has given no sign of life for {} in instant {}", name,
+                                         redag::humanize_duration(options_.patience), order_.instant),
+                             "its process has ended or stands still; executors that compute report each second");
   }
   return {};
 }

@@ -26,8 +26,8 @@
 namespace redag_rclcpp::lab {
 
 struct PlayOptions {
-  std::uint32_t executors = 1;  // that follow; 0: waits for nobody, as `ros2 bag play --clock`
-  double rate = 1;              // recorded time per time; 0: as fast as the executors
+  std::uint32_t executors = 1;                      // that follow; 0: waits for nobody, as `ros2 bag play --clock`
+  double rate = 1;                                  // recorded time per time; 0: as fast as the executors
   redag::Duration tick = 10 * redag::kMillisecond;  // the longest step of /clock, and the shortest of timers
   redag::Duration patience = 10 * redag::kSecond;   // with an executor that gives no sign of life
   std::uint32_t repeat = 1;                         // the clock jumps back in between
@@ -96,9 +96,9 @@ class LockstepPlayer {
   PlayResult result_;
   redag::Rng random_;
   bool paused_ = false;
-  bool complete_ = false;         // all executors are known; others come too late
-  redag::Time begun_ = redag::kNever;   // CLOCK_MONOTONIC; when the recording's first instant was due
-  redag::Time first_ = 0;         // that instant's time
+  bool complete_ = false;              // all executors are known; others come too late
+  redag::Time begun_ = redag::kNever;  // CLOCK_MONOTONIC; when the recording's first instant was due
+  redag::Time first_ = 0;              // that instant's time
 };
 
 }  // namespace redag_rclcpp::lab

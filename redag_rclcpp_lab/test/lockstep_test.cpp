@@ -6,12 +6,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <sqlite3.h>
-
 #include <atomic>
 #include <cstdlib>
-#include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <memory>
 #include <mutex>
@@ -20,10 +16,9 @@
 #include <thread>
 #include <vector>
 
-#include "bag_recording.hpp"
 #include "lockstep_player.hpp"
 #include "rclcpp/rclcpp.hpp"
-#include "rclcpp/serialization.hpp"
+#include "recordings.hpp"
 #include "redag_rclcpp/coroutine.hpp"
 #include "redag_rclcpp/executor.hpp"
 #include "std_msgs/msg/u_int64.hpp"
@@ -39,96 +34,6 @@ using redag::Time;
 using std_msgs::msg::UInt64;
 using std_srvs::srv::Trigger;
 using testing::HasSubstr;
-
-constexpr Time kStart = 1'700'000'000 * kSecond;
-
-/// Messages at random times, several at the same one; always the same.
-class RandomRecording final : public Recording {
- public:
-  explicit RandomRecording(std::uint64_t instants) {
-    for (const char *topic : {"/scan", "/odom", "/imu"}) topics_.push_back({topic, "std_msgs/msg/UInt64"});
-    redag::Rng random(7);
-    Time time = kStart;
-    for (std::uint64_t i = 0; i < instants; ++i, time += random.uniform(1, 8) * kMillisecond) {
-      for (std::int64_t n = random.uniform(1, 5); n > 0; --n) {
-        UInt64 message;
-        message.data = 10 * i + static_cast<std::uint64_t>(n);
-        RecordedMessage recorded;
-        recorded.time = time;
-        recorded.topic = static_cast<std::size_t>(random.uniform(0, 2));
-        rclcpp::Serialization<UInt64>().serialize_message(&message, &recorded.data);
-        messages_.push_back(std::move(recorded));
-      }
-    }
-  }
-  [[nodiscard]] const std::vector<RecordedTopic> &topics() const override { return topics_; }
-  [[nodiscard]] redag::Result<bool> next(RecordedMessage &message) override {
-    if (at_ == messages_.size()) return false;
-    message = messages_[at_++];
-    return true;
-  }
-  [[nodiscard]] redag::Result<void> rewind() override {
-    at_ = 0;
-    return {};
-  }
-
- private:
-  std::vector<RecordedTopic> topics_;
-  std::vector<RecordedMessage> messages_;
-  std::size_t at_ = 0;
-};
-
-/// Writes a recording as rosbag2 does, to a folder of its own.
-class WrittenBag {
- public:
-  explicit WrittenBag(RandomRecording recording) {
-    std::string name = (std::filesystem::temp_directory_path() / "redag_bag_XXXXXX").string();
-    folder_ = mkdtemp(name.data());
-    EXPECT_EQ(sqlite3_open((folder_ / "bag_0.db3").c_str(), &database_), SQLITE_OK);
-    execute(
-        "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT, "
-        "offered_qos_profiles TEXT);"
-        "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB);"
-        "INSERT INTO topics VALUES(9, '/clock', 'rosgraph_msgs/msg/Clock', 'cdr', '');");
-    int id = 0;
-    for (const RecordedTopic &topic : recording.topics()) {
-      ++id;
-      execute("INSERT INTO topics VALUES(" + std::to_string(id) + ", '" + topic.name + "', '" + topic.type +
-              "', 'cdr', '- history: keep_last\n  durability: " + (id == 1 ? "transient_local" : "volatile") + "\n');");
-    }
-    execute("BEGIN");
-    sqlite3_stmt *insert = nullptr;
-    sqlite3_prepare_v2(database_, "INSERT INTO messages(topic_id, timestamp, data) VALUES(?, ?, ?)", -1, &insert,
-                       nullptr);
-    RecordedMessage message;
-    while (*recording.next(message)) {
-      const rcl_serialized_message_t &data = message.data.get_rcl_serialized_message();
-      sqlite3_bind_int64(insert, 1, static_cast<std::int64_t>(message.topic) + 1);
-      sqlite3_bind_int64(insert, 2, message.time);
-      sqlite3_bind_blob(insert, 3, data.buffer, static_cast<int>(data.buffer_length), SQLITE_TRANSIENT);
-      EXPECT_EQ(sqlite3_step(insert), SQLITE_DONE);
-      sqlite3_reset(insert);
-    }
-    sqlite3_finalize(insert);
-    execute("COMMIT");
-    sqlite3_close(database_);
-  }
-  ~WrittenBag() { std::filesystem::remove_all(folder_); }
-
-  [[nodiscard]] const std::filesystem::path &folder() const { return folder_; }
-  void write(const char *name, const std::string &text) const { std::ofstream(folder_ / name) << text; }
-  [[nodiscard]] std::string read(const char *name) const {
-    std::ifstream file(folder_ / name);
-    return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  }
-
- private:
-  void execute(const std::string &text) {
-    EXPECT_EQ(sqlite3_exec(database_, text.c_str(), nullptr, nullptr, nullptr), SQLITE_OK) << sqlite3_errmsg(database_);
-  }
-  std::filesystem::path folder_;
-  sqlite3 *database_ = nullptr;
-};
 
 /// What callbacks did: one line each, with the time of their node's clock, what they took and what they published.
 class Record {
@@ -170,13 +75,13 @@ class Robot {
           record.add(*fuse_, "map");
         });
     client_ = plan_->create_client<Trigger>("/map");
-    timers_.push_back(plan_->create_timer(70ms, redag_rclcpp::coroutine([this]() -> redag::Coroutine {
-      record.add(*plan_, "asks");
-      (void)co_await redag_rclcpp::call(client_, std::make_shared<Trigger::Request>());
-      record.add(*plan_, "is answered");
-      co_await redag_rclcpp::sleep_for(plan_->get_clock(), rclcpp::Duration(20ms));
-      record.add(*plan_, "has slept");
-    })));
+    timers_.push_back(timer_of(plan_, 70ms, redag_rclcpp::coroutine([this]() -> redag::Coroutine {
+                                 record.add(*plan_, "asks");
+                                 (void)co_await redag_rclcpp::call(client_, std::make_shared<Trigger::Request>());
+                                 record.add(*plan_, "is answered");
+                                 co_await redag_rclcpp::sleep_for(plan_->get_clock(), rclcpp::Duration(20ms));
+                                 record.add(*plan_, "has slept");
+                               })));
   }
 
   void add_to(ReDAGExecutor &executor) {
@@ -184,9 +89,8 @@ class Robot {
   }
 
   rclcpp::Node::SharedPtr node(const std::string &name) {
-    return std::make_shared<rclcpp::Node>(name, rclcpp::NodeOptions()
-                                                    .use_intra_process_comms(in_process_)
-                                                    .parameter_overrides({{"use_sim_time", true}}));
+    return std::make_shared<rclcpp::Node>(
+        name, rclcpp::NodeOptions().use_intra_process_comms(in_process_).parameter_overrides({{"use_sim_time", true}}));
   }
   void react(const rclcpp::Node::SharedPtr &to, const std::string &topic,
              const rclcpp::Publisher<UInt64>::SharedPtr &publisher) {
@@ -197,9 +101,15 @@ class Robot {
           send(publisher, 3 * message.data + 1);
         }));
   }
+  /// As rclcpp::Node::create_timer(), which Humble lacks.
+  template <class Function>
+  static rclcpp::TimerBase::SharedPtr timer_of(const rclcpp::Node::SharedPtr &node, std::chrono::milliseconds period,
+                                               Function function) {
+    return rclcpp::create_timer(node, node->get_clock(), rclcpp::Duration(period), std::move(function));
+  }
   void tick(const rclcpp::Node::SharedPtr &to, std::chrono::milliseconds period,
             const rclcpp::Publisher<UInt64>::SharedPtr &publisher) {
-    timers_.push_back(to->create_timer(period, [this, to, period, publisher] {
+    timers_.push_back(timer_of(to, period, [this, to, period, publisher] {
       record.add(*to, "timer", static_cast<std::uint64_t>(period.count()));
       dawdle();
       send(publisher, ++sum_);
@@ -234,15 +144,16 @@ class Robot {
 /// Keeps a processor busy, with pauses.
 class Load {
  public:
-  Load() : thread_([this] {
-    std::minstd_rand random{std::random_device{}()};
-    while (!done_) {
-      const auto end = std::chrono::steady_clock::now() + std::chrono::microseconds(random() % 5000);
-      while (std::chrono::steady_clock::now() < end) {
-      }
-      std::this_thread::sleep_for(std::chrono::microseconds(random() % 3000));
-    }
-  }) {}
+  Load()
+      : thread_([this] {
+          std::minstd_rand random{std::random_device{}()};
+          while (!done_) {
+            const auto end = std::chrono::steady_clock::now() + std::chrono::microseconds(random() % 5000);
+            while (std::chrono::steady_clock::now() < end) {
+            }
+            std::this_thread::sleep_for(std::chrono::microseconds(random() % 3000));
+          }
+        }) {}
   ~Load() {
     done_ = true;
     thread_.join();
@@ -317,7 +228,6 @@ TEST_P(LockstepReplays, HaveTheSameOrderAndOutputs) {
     if (!in_lockstep) {
       how.executors = 0;
       how.rate = 1;
-      std::this_thread::sleep_for(500ms);
     }
     RandomRecording recording(60);
     LockstepPlayer player(player_node(), how);
@@ -344,7 +254,8 @@ TEST_P(LockstepReplays, HaveTheSameOrderAndOutputs) {
     EXPECT_EQ(order, hash);
     if (lines != first) {
       const std::size_t shorter = std::min(lines.size(), first.size());
-      const auto [a, b] = std::mismatch(lines.begin(), lines.begin() + static_cast<std::ptrdiff_t>(shorter), first.begin());
+      const auto [a, b] =
+          std::mismatch(lines.begin(), lines.begin() + static_cast<std::ptrdiff_t>(shorter), first.begin());
       ++differ;
       std::cerr << "replay " << i << " differs at callback " << a - lines.begin() << " of " << lines.size() << ", "
                 << first.size() << ": " << (a == lines.end() ? "-" : *a) << " | " << (b == first.end() ? "-" : *b)
@@ -387,42 +298,6 @@ TEST_F(Lockstep, AProgramReplaysABag) {
   EXPECT_GT(first.size(), 1000U);
   EXPECT_EQ(differ, 0U);
   std::cout << replays << " replays, " << differ << " differ; " << bag.read("out");
-}
-
-TEST(LockstepBag, IsReadOrRefused) {
-  const WrittenBag bag(RandomRecording(5));
-  const auto whole = open_bag(bag.folder().string(), {});
-  ASSERT_TRUE(whole) << to_string(whole.error());
-  ASSERT_EQ((*whole)->topics().size(), 3U);  // without /clock
-  for (const RecordedTopic &topic : (*whole)->topics()) EXPECT_EQ(topic.latched, topic.name == "/scan");
-  RandomRecording expected(5);
-  RecordedMessage one;
-  RecordedMessage other;
-  while (*expected.next(one)) {
-    ASSERT_TRUE(*(*whole)->next(other));
-    EXPECT_EQ(one.time, other.time);
-    EXPECT_EQ(expected.topics()[one.topic].name, (*whole)->topics()[other.topic].name);
-    EXPECT_EQ(one.data.size(), other.data.size());
-  }
-  EXPECT_FALSE(*(*whole)->next(other));
-  ASSERT_TRUE((*whole)->rewind());
-  EXPECT_TRUE(*(*whole)->next(other));
-
-  EXPECT_EQ((*open_bag((bag.folder() / "bag_0.db3").string(), {"/imu"}))->topics().size(), 1U);
-  const auto refusal = [](const std::string &path, const std::set<std::string> &topics = {}) {
-    const auto opened = open_bag(path, topics);
-    return opened ? std::string("opened") : to_string(opened.error());
-  };
-  EXPECT_THAT(refusal(bag.folder().string(), {"/map"}), HasSubstr("has no topic '/map'"));
-  EXPECT_THAT(refusal("/nowhere"), HasSubstr("there is no bag '/nowhere'"));
-  bag.write("metadata.yaml", "rosbag2_bagfile_information:\n  compression_mode: FILE\n");
-  EXPECT_THAT(refusal(bag.folder().string()), HasSubstr("is compressed"));
-  bag.write("metadata.yaml", "");
-  bag.write("bag_1.db3", "this is no database, but long enough to be looked at as one");
-  EXPECT_THAT(refusal(bag.folder().string()), HasSubstr("bag_1.db3: cannot read"));
-  std::filesystem::remove(bag.folder() / "bag_0.db3");
-  std::filesystem::remove(bag.folder() / "bag_1.db3");
-  EXPECT_THAT(refusal(bag.folder().string()), HasSubstr("ros2 bag convert"));
 }
 
 // Each callback sees the time of its instant, also where the clock jumps back.
@@ -486,7 +361,7 @@ TEST_F(Lockstep, TwoExecutorsGoTogether) {
     const auto other = robot.node("other");
     const auto subscription = other->create_subscription<UInt64>(
         "/imu", 10, [&](const UInt64 &message) { of_other.add(*other, "/imu", message.data); });
-    const auto timer = other->create_timer(30ms, [&] { of_other.add(*other, "timer"); });
+    const auto timer = Robot::timer_of(other, 30ms, [&] { of_other.add(*other, "timer"); });
     ReDAGExecutor one(options());
     ReDAGExecutor two(options());
     robot.add_to(one);
@@ -515,7 +390,7 @@ TEST_F(Lockstep, ASubscriptionMadeByACallbackGetsTheNextMessages) {
   Robot robot;
   const auto late = robot.node("late");
   int calls = 0;
-  const auto timer = late->create_timer(30ms, [&] {
+  const auto timer = Robot::timer_of(late, 30ms, [&] {
     if (++calls == 3) robot.react(late, "/imu", nullptr);
   });
   ReDAGExecutor executor(options());
@@ -595,21 +470,6 @@ TEST_F(Lockstep, MoreExecutorsThanExpectedAreRefused) {
   const auto result = player.play(recording);
   ASSERT_FALSE(result);
   EXPECT_THAT(to_string(result.error()), HasSubstr("2 executors are in lockstep, and --executors says 1"));
-}
-
-TEST(LockstepMessages, AreReadAsTheyWereWritten) {
-  const lockstep::Order order{.kind = lockstep::Order::Kind::Instant, .session = "s", .player = "p", .instant = 3,
-                              .time = 5, .published = {{"/a", 2}}};
-  const auto read = lockstep::parse_order(to_text(order));
-  ASSERT_TRUE(read);
-  EXPECT_EQ(to_text(*read), to_text(order));
-  lockstep::Report report{.kind = lockstep::Report::Kind::Busy, .session = "s", .executor = "e", .instant = 3,
-                          .jobs = 4, .order = ~0ULL, .text = "t", .outside = {{"x", 1}}, .subscriptions = {{"/a", 2}}};
-  const auto read_report = lockstep::parse_report(to_text(report));
-  ASSERT_TRUE(read_report);
-  EXPECT_EQ(to_text(*read_report), to_text(report));
-  EXPECT_THAT(to_string(lockstep::parse_order("{\"kind\": \"leap\"}").error()), HasSubstr("'kind' is 'leap'"));
-  EXPECT_FALSE(lockstep::parse_report("nonsense"));
 }
 
 }  // namespace

@@ -143,7 +143,8 @@ Result<Arguments> parse_arguments(const std::vector<std::string> &words) {
     const std::size_t equals = word.find('=');
     const std::string name = word.substr(0, equals);
     if (std::find(kWithValue.begin(), kWithValue.end(), name) == kWithValue.end()) {
-      return redag::make_error(fmt::format("there is no option '{}'", name), "'play_lockstep --help' lists the options");
+      return redag::make_error(fmt::format("there is no option '{}'", name),
+                               "'play_lockstep --help' lists the options");
     }
     if (equals == std::string::npos && i + 1 == words.size()) {
       return redag::make_error(fmt::format("{} needs a value", name));
@@ -158,7 +159,8 @@ Result<Arguments> parse_arguments(const std::vector<std::string> &words) {
 // Names of executors differ from run to run.
 void write_line(std::FILE *log, redag::Time time, const PlayResult &result) {
   std::vector<std::pair<std::uint64_t, std::uint64_t>> orders;
-  for (const auto &[name, follower] : result.executors) orders.emplace_back(follower.report.jobs, follower.report.order);
+  for (const auto &[name, follower] : result.executors)
+    orders.emplace_back(follower.report.jobs, follower.report.order);
   std::sort(orders.begin(), orders.end());
   fmt::print(log, "{} {}", result.instants, time);
   for (const auto &[jobs, order] : orders) fmt::print(log, "  {} {:016x}", jobs, order);
