@@ -22,10 +22,9 @@ using redag::kSecond;
 
 namespace {
 
-constexpr Duration kPatience = 10 * kSecond;  // with messages that the player has published
-constexpr Duration kSignOfLife = kSecond;     // between reports while an instant lasts
-// After the start, until the warning that there is no player; then between looks whether there still is one.
-constexpr Duration kLookForPlayer = 5 * kSecond;
+constexpr Duration kPatience = 10 * kSecond;      // with messages that the player has published
+constexpr Duration kSignOfLife = kSecond;         // between reports while an instant lasts
+constexpr Duration kLookForPlayer = 5 * kSecond;  // after the start: until the warning that there is no player
 
 rclcpp::Logger logger() { return rclcpp::get_logger("redag_rclcpp.lockstep"); }
 
@@ -118,7 +117,7 @@ void Lockstep::look() {
       if (!warned_free_) next_look_ = since_ + kLookForPlayer;
       break;
     case State::Connecting:
-    case State::Between: next_look_ = now + kLookForPlayer; break;
+    case State::Between: next_look_ = now + kSignOfLife; break;
     case State::Gathering:
       if (now - since_ >= kPatience) return fail(missing());
       next_look_ = told_ + kSignOfLife;
@@ -165,9 +164,9 @@ void Lockstep::obey(const Order &order) {
   }
   if (order.kind == Order::Kind::End) return end("the player has ended");
   if (order.instant != order_.instant + 1 || state_ != State::Between) {
-    order_.instant = order.instant;
-    return fail(
-        fmt::format("instant {} was announced in the place of the one after {}", order.instant, order_.instant));
+    const std::uint64_t last = std::exchange(order_.instant, order.instant);
+    return fail(fmt::format("it was announced when {} was the last, {}", last,
+                            state_ == State::Between ? "and those in between are missing" : "which has not ended"));
   }
   order_ = order;
   for (const auto &[topic, number] : order.published) published_[topic] = number;
@@ -191,6 +190,7 @@ void Lockstep::begin(const Order &order) {
     RCLCPP_INFO(logger(), "following player %s", order.player.c_str());
   }
   if (state_ != State::Connecting && state_ != State::Between) return;
+  clocks_held_ = false;  // a node may use simulated time only now
   refresh();
   const std::string lacking = unconnected();
   if (lacking.empty()) {
@@ -219,8 +219,9 @@ void Lockstep::end(const char *why) {
 
 // Learns of callbacks that have come and gone.
 void Lockstep::refresh() {
-  clocks_held_ = clocks_.hold(parts_.registry.nodes());
   const std::uint64_t change = parts_.registry.changes();
+  if (change == seen_change_ && clocks_held_) return;
+  clocks_held_ = clocks_.hold(parts_.registry.nodes());
   if (change == seen_change_) return;
   seen_change_ = change;
   connected_ = false;

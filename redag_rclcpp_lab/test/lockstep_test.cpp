@@ -455,6 +455,36 @@ TEST_F(Lockstep, AnExecutorThatIsSilentIsNamed) {
   EXPECT_THAT(to_string(result.error()), HasSubstr("executor mute has given no sign of life for 200ms in instant 1"));
 }
 
+// A player that was killed says no end. What has waited for it runs then.
+TEST_F(Lockstep, NothingWaitsForAPlayerThatHasGone) {
+  Robot robot;
+  ReDAGExecutor executor(options());
+  robot.add_to(executor);
+  const Spinner spinner(executor);
+  const auto node = player_node();
+  bool ready = false;
+  const auto reports = node->create_subscription<std_msgs::msg::String>(
+      lockstep::kReportTopic, lockstep::qos(), [&](const std_msgs::msg::String &message) {
+        ready = ready || lockstep::parse_report(message.data)->kind == lockstep::Report::Kind::Ready;
+      });
+  auto orders = node->create_publisher<std_msgs::msg::String>(lockstep::kOrderTopic, lockstep::qos());
+  const auto scans = node->create_publisher<UInt64>("/scan", 10);
+  std_msgs::msg::String begin;
+  begin.data = to_text(lockstep::Order{.session = "s", .player = node->get_name(), .published = {{"/scan", 0}}});
+  rclcpp::executors::SingleThreadedExecutor spinner_of_node;
+  spinner_of_node.add_node(node);
+  while (!ready) {
+    orders->publish(begin);
+    spinner_of_node.spin_once(50ms);
+  }
+  scans->publish(UInt64());
+  std::this_thread::sleep_for(50ms);
+  EXPECT_THAT(robot.record.lines(), testing::IsEmpty());
+  orders.reset();
+  while (robot.record.lines().empty()) std::this_thread::sleep_for(1ms);
+  EXPECT_THAT(robot.record.lines().front(), HasSubstr("/scan 0"));
+}
+
 TEST_F(Lockstep, MoreExecutorsThanExpectedAreRefused) {
   ReDAGExecutor one(options());
   ReDAGExecutor other(options());
