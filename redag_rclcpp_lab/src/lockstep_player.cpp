@@ -204,7 +204,7 @@ Result<void> LockstepPlayer::play_once(Recording &recording) {
       if (!has_next) return tl::unexpected(has_next.error());
     }
     if (time == tick) tick += options_.tick;
-    if (!pace(time)) return {};
+    if (!pace(time)) break;
     if (Result<void> done = step(time, messages); !done) return done;
     last = time;
   }
