@@ -302,6 +302,7 @@ void Engine::pause() {
   Locked locked(*this);
   paused_ = true;
   refresh_outranked();
+  if (pause_waiters_ > 0) wake_pause_waiters();
 }
 
 void Engine::resume() {
@@ -320,6 +321,24 @@ bool Engine::wait_paused(Time deadline) {
       Locked locked(*this);
       if (!paused_) return false;
       if (placement_.unfinished() == 0) return true;
+      if (!in_time) return false;
+      ++pause_waiters_;
+      seen = pause_changes_.load(std::memory_order_relaxed);
+    }
+    in_time = futex_wait_until(pause_changes_, seen, deadline);
+    Locked locked(*this);
+    --pause_waiters_;
+  }
+}
+
+bool Engine::wait_quiet(Time deadline) {
+  for (bool in_time = true;;) {
+    std::uint32_t seen = 0;
+    {
+      Locked locked(*this);
+      withdraw_if_halting(locked);
+      if (paused_ || halted_at_ != kNever) return false;
+      if (is_quiet()) return true;
       if (!in_time) return false;
       ++pause_waiters_;
       seen = pause_changes_.load(std::memory_order_relaxed);

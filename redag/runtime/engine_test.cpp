@@ -11,7 +11,9 @@
 #include <optional>
 #include <thread>
 
+#include "redag/runtime/async_event.hpp"
 #include "redag/runtime/clock.hpp"
+#include "redag/runtime/coroutine_body.hpp"
 #include "redag/runtime/preemption_point.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_testing/allocation_counter.hpp"
@@ -351,6 +353,73 @@ TEST_P(EngineInEveryMode, PausedItStartsNothingAndKeepsWhatIsReleased) {
   EXPECT_EQ(bench.log(), "+2 -2 +1 -1 +0 -0");
   bench.engine->resume();
   done.wait();
+  bench.finish();
+}
+
+// A lot of jobs is at its end when those that they released, or woke, are.
+TEST_P(EngineInEveryMode, IsQuietWhenNothingCanGoOn) {
+  Bench bench(ladder(3), GetParam(), 1);
+  ASSERT_TRUE(bench.engine->let_wait());
+  AsyncEvent answer;
+  Event begun;
+  Event go;
+  const auto wait = [&](AsyncEvent &event) -> Coroutine {
+    co_await event;
+    bench.write("*1");
+  };
+  bench.bodies[1] = [&](const Job &) {
+    run_in_job(wait(answer));
+    return Outcome::Finished;
+  };
+  bench.bodies[2] = [&](const Job &job) {
+    if (job.number == 1) {
+      begun.set();
+      go.wait();
+    }
+    bench.release({0});
+    if (job.number == 1) answer.set();
+    return Outcome::Finished;
+  };
+  bench.start();
+  EXPECT_TRUE(bench.engine->wait_quiet(kNever));
+  bench.release({1, 2});
+  EXPECT_TRUE(bench.engine->wait_quiet(kNever)) << "a job that waits does not count";
+  EXPECT_EQ(bench.engine->accounting(TaskId(0)).finished, 1U);
+  EXPECT_EQ(bench.engine->accounting(TaskId(1)).finished, 0U);
+  bench.release({2});
+  begun.wait();
+  EXPECT_FALSE(bench.engine->wait_quiet(monotonic_now()));
+  go.set();
+  EXPECT_TRUE(bench.engine->wait_quiet(kNever));
+  EXPECT_EQ(bench.engine->accounting(TaskId(0)).finished, 2U);
+  EXPECT_EQ(bench.engine->accounting(TaskId(1)).finished, 1U);
+  EXPECT_EQ(bench.engine->accounting(TaskId(2)).finished, 2U);
+  bench.engine->pause();
+  EXPECT_FALSE(bench.engine->wait_quiet(kNever));
+  bench.engine->resume();
+  bench.finish();
+  EXPECT_FALSE(bench.engine->wait_quiet(kNever));
+}
+
+// A pause ends the wait: jobs that the pause keeps from starting would make it last.
+TEST_P(EngineInEveryMode, APauseEndsTheWaitForQuiet) {
+  Bench bench(ladder(2), GetParam(), 1);
+  Event begun;
+  Event go;
+  bench.bodies[1] = [&](const Job &) {
+    begun.set();
+    go.wait();
+    return Outcome::Finished;
+  };
+  bench.start();
+  bench.release({1});
+  begun.wait();
+  std::thread waiter([&] { EXPECT_FALSE(bench.engine->wait_quiet(kNever)); });
+  bench.engine->pause();
+  waiter.join();
+  go.set();
+  EXPECT_TRUE(bench.engine->wait_paused(kNever));
+  bench.engine->resume();
   bench.finish();
 }
 

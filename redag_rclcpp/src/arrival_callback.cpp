@@ -7,6 +7,8 @@
 #include <cmath>
 #include <utility>
 
+#include "lockstep.hpp"
+
 namespace redag_rclcpp {
 
 using redag::kNever;
@@ -47,9 +49,10 @@ void ArrivalCallback::detach() {
 
 // ---- arrivals ----
 
-void ArrivalCallback::arrived(std::size_t count, Source source, int part, bool seen_only) {
+void ArrivalCallback::arrived(std::size_t count, Source source, int part, bool seen_only, bool leftover) {
   std::shared_ptr<ExecutorContext> to_wake;
   std::shared_ptr<ExecutorContext> to_tell;
+  std::shared_ptr<ExecutorContext> to_pace;
   Time now = 0;
   Release release;
   bool begins = false;
@@ -62,14 +65,21 @@ void ArrivalCallback::arrived(std::size_t count, Source source, int part, bool s
     // Messages of this process arrive on the publishing thread, within the job that is the task's predecessor.
     const redag::runtime::RunningJob *publisher = engine().current_job();
     if (context()->learning()) learn_from_arrival(now, count, source, publisher);
-    const Time origin = origin_of(now, publisher);
+    const bool from_outside = is_from_outside(publisher, leftover);
+    const bool held = from_outside && paced_;
+    if (held) {
+      paced_arrivals_ += count;
+      to_pace = context();
+    }
+    const Time turn = lockstep() == nullptr ? now : lockstep()->turn();
+    const Time origin = origin_of(turn, publisher);
     const bool direct = context()->direct();
     if (depth_ > 0) count = std::min(count, depth_);
     bool replaces = false;
     for (std::size_t i = 0; i < count; ++i) {
       if (depth_ > 0 && kept_[index_of(source)] >= depth_) {
         const Overwritten whose = drop_oldest(source);
-        if (whose == Overwritten::Released && direct && !replaces && releases_.none()) {
+        if (whose == Overwritten::Released && direct && !replaces && !held && releases_.none()) {
           // The released job's message is gone. Its release is replaced by one for the next message. A release that is
           // still in progress could come after the one that replaces it, and stands for the next message instead.
           replaces = true;
@@ -78,11 +88,13 @@ void ArrivalCallback::arrived(std::size_t count, Source source, int part, bool s
         }
         if (whose == Overwritten::Started) continue;
       }
-      tokens_.push(Token{.arrival = now,
+      tokens_.push(Token{.arrival = turn,
                          .origin = origin,
                          .source = source,
                          .part = part,
                          .seen_only = seen_only,
+                         .held = held,
+                         .from_outside = from_outside && !held,
                          .sender = publisher == nullptr ? redag::JobSlot() : publisher->slot});
       ++kept_[index_of(source)];
     }
@@ -102,6 +114,14 @@ void ArrivalCallback::arrived(std::size_t count, Source source, int part, bool s
   if (uses_engine) end_release();
   if (to_wake) to_wake->wake();
   if (to_tell) to_tell->exchange_arrived();
+  if (to_pace) to_pace->lockstep()->arrived();
+}
+
+// In lockstep: true unless a job of this executor has sent it. What a job publishes within the process arrives on the
+// job's thread.
+bool ArrivalCallback::is_from_outside(const redag::runtime::RunningJob *publisher, bool leftover) const {
+  if (lockstep() == nullptr || publisher != nullptr || leftover) return false;
+  return !is_ros_internal(id()) && (takes_part_ || id().kind == redag::Callback::Kind::Subscription);
 }
 
 // Removes the token of the oldest message, which the middleware has overwritten. Returns what became of its job.
@@ -126,7 +146,7 @@ ArrivalCallback::Overwritten ArrivalCallback::drop_oldest(Source source) {
 // left lock_. Without a job of the task that is in progress, only releases_ keeps the engine, and the task's id its
 // own.
 bool ArrivalCallback::begin_release(Release &release) {
-  if (released_ > 0 || !context() || tokens_.empty()) return false;
+  if (released_ > 0 || !context() || !has_token()) return false;
   if (!context()->direct()) {
     if (!noted_) {
       noted_ = true;
@@ -162,7 +182,7 @@ void ArrivalCallback::admit() {
   {
     const redag::LockGuard guard(lock_);
     noted_ = false;
-    if (!context() || released_ > 0 || tokens_.empty()) return;
+    if (!context() || released_ > 0 || !has_token()) return;
     begin_release_of_first(release);
   }
   engine().release(release, engine().now());
@@ -205,7 +225,7 @@ bool ArrivalCallback::take_token(Token &token) {
   {
     const redag::LockGuard guard(lock_);
     if (released_ > 0) --released_;
-    if (tokens_.empty()) return false;
+    if (!has_token()) return false;
     token = tokens_.pop();
     const std::size_t at = index_of(token.source);
     dropping_[at] += std::exchange(dropped_[at], 0);
@@ -221,10 +241,11 @@ bool ArrivalCallback::take_token(Token &token) {
 
 // Among equal rates the oldest data goes first: a chain of callbacks that began earlier ends earlier. Data that came to
 // this callback before, or is older than the callback's deadline, counts as new. Otherwise callbacks that publish to
-// each other in a circle would go first for ever.
+// each other in a circle would go first for ever. In lockstep, ages on the wall's clock play no part.
 Time ArrivalCallback::origin_of(Time now, const redag::runtime::RunningJob *publisher) {
   Time origin = now;
-  if (publisher != nullptr && publisher->origin != last_origin_ && now - publisher->origin <= deadline()) {
+  const bool is_young = publisher != nullptr && (lockstep() != nullptr || now - publisher->origin <= deadline());
+  if (is_young && publisher->origin != last_origin_) {
     origin = publisher->origin;
   }
   last_origin_ = origin;
@@ -300,7 +321,48 @@ void ArrivalCallback::release_leftovers(Source source) {
     leftovers_[index_of(source)] = true;
     if (kept_[index_of(source)] > 0) return;
   }
-  arrived(1, source, 0);
+  arrived(1, source, 0, false, true);
+}
+
+// ---- lockstep ----
+
+void ArrivalCallback::pace(bool paced, std::uint64_t arrived) {
+  {
+    const redag::LockGuard guard(lock_);
+    paced_ = paced;
+    paced_arrivals_ = arrived;
+    if (paced || !context()) return;
+  }
+  begin_instant(lockstep()->turn());  // without a player, nothing waits
+}
+
+std::optional<Callback::Paced> ArrivalCallback::paced() const {
+  Paced paced;
+  {
+    const redag::LockGuard guard(lock_);
+    if (!paced_) return std::nullopt;
+    paced.arrived = paced_arrivals_;
+  }
+  paced.countable = !by_wait_set_;
+  describe(paced);
+  return paced;
+}
+
+void ArrivalCallback::begin_instant(Time turn) {
+  Release release;
+  {
+    const redag::LockGuard guard(lock_);
+    for (std::size_t i = 0; i < tokens_.size(); ++i) {
+      Token &token = tokens_.at(i);
+      if (!token.held) continue;
+      token.held = false;
+      token.arrival = turn;
+      token.origin = turn;
+    }
+    if (!begin_release(release)) return;
+  }
+  engine().release(release, engine().now());
+  end_release();
 }
 
 // ---- jobs ----
@@ -346,6 +408,8 @@ bool ArrivalCallback::execute_token(const Token &token) {
   Taking taking(*this, token.source);
   if (token.after_skipped) drop_skipped(token.source);
   const bool taken = handle(token, taking);
+  // There are arrivals without a message, for instance when a publisher goes.
+  if (taken && token.from_outside) lockstep()->came_from_outside(*this);
   bool more = false;
   // This job has lowered kept_ and now reads leftovers_. release_leftovers() sets leftovers_ and then reads kept_. At
   // least one of them sees what the other wrote.
@@ -355,7 +419,7 @@ bool ArrivalCallback::execute_token(const Token &token) {
     leftovers = leftovers && taken;
     more = leftovers && kept_[index_of(token.source)] == 0;
   }
-  if (more) arrived(1, token.source, 0);
+  if (more) arrived(1, token.source, 0, false, true);
   return taken;
 }
 
@@ -370,7 +434,7 @@ bool ArrivalCallback::handle_next() {
   Token token;
   {
     const redag::LockGuard guard(lock_);
-    if (tokens_.empty()) return false;
+    if (!has_token()) return false;
     token = tokens_.pop();
   }
   (void)execute_token(token);

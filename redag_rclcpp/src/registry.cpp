@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <set>
+#include <string_view>
+#include <tuple>
 #include <utility>
 
 #include "compat.hpp"
@@ -150,12 +152,14 @@ std::vector<Entity> Registry::find_all() {
   // node.
   const auto groups = groups_();
   std::map<const rclcpp::CallbackGroup *, std::string> nodes;
+  std::map<const rclcpp::CallbackGroup *, std::size_t> positions;
   std::set<const rclcpp::CallbackGroup *> defaults;
   for (const auto &weak : nodes_) {
     if (const auto node = weak.lock()) {
       defaults.insert(node->get_default_callback_group().get());
       node->for_each_callback_group([&](const rclcpp::CallbackGroup::SharedPtr &group) {
         nodes.emplace(group.get(), node->get_fully_qualified_name());
+        positions.emplace(group.get(), positions.size());
       });
     }
   }
@@ -167,10 +171,19 @@ std::vector<Entity> Registry::find_all() {
     }
   }
 
-  std::vector<Entity> result;
+  // rclcpp's order is that of addresses. Names that are counted, and ties of priorities, have to be the same in each
+  // run.
+  std::vector<std::pair<std::size_t, rclcpp::CallbackGroup::SharedPtr>> ordered;
   for (const auto &weak : groups) {
     const auto group = weak.lock();
     if (!group) continue;
+    const auto position = positions.find(group.get());
+    ordered.emplace_back(position == positions.end() ? positions.size() : position->second, group);
+  }
+  std::stable_sort(ordered.begin(), ordered.end(), [](const auto &a, const auto &b) { return a.first < b.first; });
+
+  std::vector<Entity> result;
+  for (const auto &[order, group] : ordered) {
     (void)group_name(group);  // Watches empty groups, too, because an entity may be created in them.
     const std::size_t first = result.size();
     find_entities(group, result);
@@ -219,6 +232,7 @@ void Registry::add(const Entity &found) {
       [callback](const redag::runtime::Job &job) { return callback->execute(job); }, callback);
   parts_.tasks.set(task, std::move(entry));
   callbacks_[found.key] = callback;
+  ++changes_;
   if (callback->attach(task)) parts_.bridge.add(callback);
 }
 
@@ -248,12 +262,46 @@ void Registry::remove(const std::shared_ptr<Callback> &gone) {
   const std::shared_ptr<Callback> callback = gone;
   const auto entry = std::find_if(callbacks_.begin(), callbacks_.end(), [&](auto &e) { return e.second == callback; });
   if (entry != callbacks_.end()) callbacks_.erase(entry);
+  ++changes_;
   callback->detach();
   parts_.timer.settle();  // afterwards the id may be another task's
   parts_.bridge.remove(*callback);
   const redag::TaskId task = callback->task();
   parts_.tasks.drop(task);
   parts_.engine.remove_task(task);
+}
+
+// ---- lists ----
+
+std::vector<std::shared_ptr<Callback>> Registry::callbacks() const {
+  std::vector<std::shared_ptr<Callback>> all;
+  {
+    const redag::LockGuard guard(collect_lock_);
+    for (const auto &[key, callback] : callbacks_) all.push_back(callback);
+  }
+  std::sort(all.begin(), all.end(), [](const auto &left, const auto &right) {
+    const redag::CallbackId &a = left->id();
+    const redag::CallbackId &b = right->id();
+    return std::tuple(std::string_view(a.node), a.kind, std::string_view(a.name), a.index, left->task().value) <
+           std::tuple(std::string_view(b.node), b.kind, std::string_view(b.name), b.index, right->task().value);
+  });
+  return all;
+}
+
+std::vector<NodeBase::SharedPtr> Registry::nodes() const {
+  std::vector<NodeBase::SharedPtr> nodes;
+  const redag::LockGuard guard(collect_lock_);
+  for (const auto &weak : nodes_) {
+    if (auto node = weak.lock()) nodes.push_back(std::move(node));
+  }
+  for (const auto &[group, weak] : manual_groups_) {
+    if (auto node = weak.lock()) nodes.push_back(std::move(node));
+  }
+  std::sort(nodes.begin(), nodes.end(), [](const auto &a, const auto &b) {
+    return std::string_view(a->get_fully_qualified_name()) < std::string_view(b->get_fully_qualified_name());
+  });
+  nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+  return nodes;
 }
 
 // ---- rates and names ----

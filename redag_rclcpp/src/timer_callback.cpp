@@ -9,6 +9,7 @@
 
 #include "compat.hpp"
 #include "entities.hpp"
+#include "lockstep.hpp"
 
 namespace redag_rclcpp {
 
@@ -72,6 +73,7 @@ class TimerCallback final : public Callback {
 
   void detach() override;
   void admit() override {}
+  void begin_instant(Time turn) override;
   [[nodiscard]] bool alive() const override { return !timer_.expired() && (!is_owned_ || !owner_.expired()); }
   [[nodiscard]] bool has_rate() const override { return true; }
   [[nodiscard]] std::shared_ptr<void> hold() override {
@@ -186,9 +188,12 @@ void TimerCallback::reschedule() {
 
 Time TimerCallback::expire(Time now, std::vector<Release> &releases, std::vector<Release> &missed) {
   const bool simulated = is_simulated(*handle_);
+  const bool follows = lockstep() != nullptr && lockstep()->follows();
+  if (follows && simulated) return kNever;  // see begin_instant()
   const TimerReading reading = read_timer(*handle_, engine());
   if (reading.cancelled) return kNever;
   if (reading.until > 0) return simulated ? kNever : reading.now + reading.until;
+  if ((follows || (simulated && lockstep() != nullptr)) && !is_ros_internal(id())) lockstep()->came_from_outside(*this);
 
   const Duration period = period_of(*handle_);
   if (simulated || period == 0) {
@@ -213,6 +218,14 @@ Time TimerCallback::expire(Time now, std::vector<Release> &releases, std::vector
     releases.push_back(Release{task(), nominal});
   }
   return nominal + period;
+}
+
+// An instant calls each timer that is due once, also one with a period of 0.
+void TimerCallback::begin_instant(Time turn) {
+  if (!is_simulated(*handle_)) return;
+  const TimerReading reading = read_timer(*handle_, engine());
+  if (reading.cancelled || reading.until > 0 || uncalled_.exchange(true)) return;
+  engine().release(Release{task(), turn}, engine().now());
 }
 
 // Consumes the expiry of a skipped job if no other job will. A timer with a grid needs none of this: the next point's

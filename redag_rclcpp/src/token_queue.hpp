@@ -16,6 +16,7 @@ class TokenQueue {
   [[nodiscard]] bool empty() const { return size_ == 0; }
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] const T &front() const { return ring_[first_]; }
+  [[nodiscard]] T &at(std::size_t position) { return ring_[(first_ + position) % ring_.size()]; }
   [[nodiscard]] const T &at(std::size_t position) const { return ring_[(first_ + position) % ring_.size()]; }
 
   void push(T value) {
