@@ -2,13 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // A chain over two hosts: the camera's host sends a datagram for each detection, and the other host brakes. Each records
-// its own run, and `redag merge-traces` puts both on one clock (docs/hosts.md):
+// its own run:
 //
-//     example_two_hosts drive 0.0.0.0 7400 results/drive       on one host
-//     example_two_hosts vision 10.0.0.2 7400 results/vision    on the other; 10.0.0.2 is the first one
-//     redag merge-traces --host vision=results/vision --host drive=results/drive \
-//         --offset vision=0 --offset drive=0+-100us \
-//         --link vision.camera.detect,drive.avoid.obstacles,2ms --out results/robot
+//     example_two_hosts drive 10.0.0.2 7400 results/drive      on one host, which has this address
+//     example_two_hosts vision 10.0.0.2 7400 results/vision    on the other
+//
+// `redag merge-traces` puts both on one clock, with the link vision.camera.detect,drive.avoid.obstacles (docs/hosts.md).
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -40,7 +39,8 @@ void compute(std::chrono::nanoseconds time) {
 // A UDP socket, and an IPv4 address to which it is bound or sends.
 class Socket {
  public:
-  Socket(const std::string &address, const std::string &port) : descriptor_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
+  Socket(const std::string &address, const std::string &port)
+      : descriptor_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
     std::uint16_t number = 0;
     const auto [end, mistake] = std::from_chars(port.data(), port.data() + port.size(), number);
     place_.sin_family = AF_INET;
@@ -79,13 +79,12 @@ void run_vision(Executor &executor, Socket &drive) {
   DagBuilder camera("camera");
   std::uint32_t count = 0;
   const TaskHandle grab = camera.timer("grab", 33ms, [] { compute(1ms); }, {.wcet = 5ms});
-  camera.data(
-      "detect", {grab},
-      [&] {
-        compute(2ms);
-        drive.send(count++);
-      },
-      {.wcet = 10ms});
+  camera.data("detect", {grab},
+              [&] {
+                compute(2ms);
+                drive.send(count++);
+              },
+              {.wcet = 10ms});
   executor.add(std::move(camera));
   executor.run_for(kLength);
 }

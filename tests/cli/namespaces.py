@@ -21,7 +21,7 @@ import time
 
 from program import PROGRAM, Case, main, redag
 
-EXAMPLE = PROGRAM.parent.parent / "examples" / "example_two_hosts"
+EXAMPLE = PROGRAM.parent.parent / "examples" / "hosts" / "example_two_hosts"
 UPTIME = {"vision": 86_400, "drive": 1_000_000}  # seconds beyond that of the machine
 ADDRESS = {"vision": "10.91.0.1", "drive": "10.91.0.2"}
 SKEW = 3_700_000  # ns: the system's clock of drive is ahead of that of vision
@@ -161,7 +161,7 @@ class TwoHosts(Case):
         released = self.times(folders["vision"], "released", 0)  # of the camera
         braked = self.times(folders["drive"], "finished", 1)
         self.skew(folders["drive"])
-        document = self.merge(folders, f"{(low + high) / 2000}us+-{(high - low) / 2000 + 0.001:.3f}us")
+        document = self.merge(folders, f"{(low + high) // 2}ns+-{(high - low) // 2 + 1}ns")
 
         hosts = {host["name"]: host for host in document["hosts"]}
         true_shift = (UPTIME["vision"] - UPTIME["drive"]) * 1_000_000_000
