@@ -1,13 +1,14 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A chain over two hosts: the camera's host sends a datagram for each detection, and the other host brakes. Each records
-// its own run:
+// A chain over two hosts: the camera's host sends a datagram for each detection, and the other host brakes. Each
+// records its own run:
 //
 //     example_two_hosts drive 10.0.0.2 7400 results/drive      on one host, which has this address
 //     example_two_hosts vision 10.0.0.2 7400 results/vision    on the other
 //
-// `redag merge-traces` puts both on one clock, with the link vision.camera.detect,drive.avoid.obstacles (docs/hosts.md).
+// `redag merge-traces` puts both on one clock, with the link vision.camera.detect,drive.avoid.obstacles
+// (docs/hosts.md).
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -81,7 +82,8 @@ void run_vision(Executor &executor, Socket &drive) {
   std::uint32_t count = 0;
   const TaskHandle grab = camera.timer("grab", 33ms, [] { compute(1ms); }, {.wcet = 5ms});
   const TaskHandle detect = camera.data("detect", {grab}, [] { compute(2ms); }, {.wcet = 10ms});
-  // A task of its own, because data can arrive before the body that sends them has ended: the link begins with `detect`.
+  // A task of its own, because data can arrive before the body that sends them has ended: the link begins with
+  // `detect`.
   camera.data("send", {detect}, [&] { drive.send(count++); }, {.wcet = 1ms});
   executor.add(std::move(camera));
   executor.run_for(kLength);

@@ -117,9 +117,10 @@ TEST(RobotYaml, MistakesInHostsAreFound) {
             "cart.yaml:1:7: error: the robot has both 'hosts' and 'cpus' (give the processors to the hosts)");
   EXPECT_EQ(findings(two + "irqs: [{name: can, match: can, cpus: 1}]\n"),
             "cart.yaml:19:8: error: nothing says on which host irqs 'can' are (add 'host:' with one of vision, drive)");
-  EXPECT_EQ(findings(two + "irqs: [{name: can, match: can, cpus: rest, host: vision}]\n"),
-            "cart.yaml:19:38: error: CPU set 'rest' is on host 'drive', and these are on host 'vision' (choose a CPU set of "
-            "the same host)");
+  EXPECT_EQ(
+      findings(two + "irqs: [{name: can, match: can, cpus: rest, host: vision}]\n"),
+      "cart.yaml:19:38: error: CPU set 'rest' is on host 'drive', and these are on host 'vision' (choose a CPU set of "
+      "the same host)");
   EXPECT_EQ(findings(two + "irqs: [{name: can, match: can, cpus: 1, host: dirve}]\n"),
             "cart.yaml:19:47: error: there is no host 'dirve' (did you mean 'drive'?)");
   EXPECT_EQ(findings(two + "threads: [{name: t, match: {process: driver}, level: {task: camera.look.grab}}]\n"),
