@@ -1,14 +1,14 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A chain over two hosts: the camera's host sends a datagram for each detection, and the other host brakes. Each records
-// its own run, and `redag merge-traces` puts both on one clock (docs/hosts.md):
+// A chain over two hosts: the camera's host sends a datagram for each detection, and the other host brakes. Each
+// records its own run:
 //
-//     example_two_hosts drive 0.0.0.0 7400 results/drive       on one host
-//     example_two_hosts vision 10.0.0.2 7400 results/vision    on the other; 10.0.0.2 is the first one
-//     redag merge-traces --host vision=results/vision --host drive=results/drive \
-//         --offset vision=0 --offset drive=0+-100us \
-//         --link vision.camera.detect,drive.avoid.obstacles,2ms --out results/robot
+//     example_two_hosts drive 10.0.0.2 7400 results/drive      on one host, which has this address
+//     example_two_hosts vision 10.0.0.2 7400 results/vision    on the other
+//
+// `redag merge-traces` puts both on one clock, with the link vision.camera.detect,drive.avoid.obstacles
+// (docs/hosts.md).
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -31,6 +31,7 @@ using namespace redag::runtime;
 namespace {
 
 constexpr auto kLength = 2s;
+constexpr auto kPatience = 3s;  // of the host that is started first
 
 void compute(std::chrono::nanoseconds time) {
   while (redag::job_cpu_time() < time.count()) {
@@ -40,7 +41,8 @@ void compute(std::chrono::nanoseconds time) {
 // A UDP socket, and an IPv4 address to which it is bound or sends.
 class Socket {
  public:
-  Socket(const std::string &address, const std::string &port) : descriptor_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
+  Socket(const std::string &address, const std::string &port)
+      : descriptor_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
     std::uint16_t number = 0;
     const auto [end, mistake] = std::from_chars(port.data(), port.data() + port.size(), number);
     place_.sin_family = AF_INET;
@@ -79,13 +81,10 @@ void run_vision(Executor &executor, Socket &drive) {
   DagBuilder camera("camera");
   std::uint32_t count = 0;
   const TaskHandle grab = camera.timer("grab", 33ms, [] { compute(1ms); }, {.wcet = 5ms});
-  camera.data(
-      "detect", {grab},
-      [&] {
-        compute(2ms);
-        drive.send(count++);
-      },
-      {.wcet = 10ms});
+  const TaskHandle detect = camera.data("detect", {grab}, [] { compute(2ms); }, {.wcet = 10ms});
+  // A task of its own, because data can arrive before the body that sends them has ended: the link begins with
+  // `detect`.
+  camera.data("send", {detect}, [&] { drive.send(count++); }, {.wcet = 1ms});
   executor.add(std::move(camera));
   executor.run_for(kLength);
 }
@@ -99,10 +98,12 @@ void run_drive(Executor &executor, Socket &vision) {
   std::atomic<bool> over{false};
   std::thread driver([&] {
     while (!over) {
-      if (vision.receive()) executor.release(obstacles);
+      if (!vision.receive()) continue;
+      // Two datagrams that come at once keep the promised distance.
+      while (!executor.release(obstacles) && !over) std::this_thread::sleep_for(1ms);
     }
   });
-  std::this_thread::sleep_for(kLength + 500ms);
+  std::this_thread::sleep_for(kLength + kPatience);
   over = true;
   driver.join();
   executor.stop();

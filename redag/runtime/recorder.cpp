@@ -68,11 +68,15 @@ void Recorder::end_thread() {
 Result<void> Recorder::describe_again() {
   trace::RunInfo info = describe_();
   info.machine = trace::this_machine();
-  info.clock = read_system_clock([this] { return engine_->now(); });
+  // Threads are started first: before the run has begun, its time is no clock.
+  if (engine_->has_origin()) info.clock = read_system_clock([this] { return engine_->now(); });
   info.provenance = current_provenance();
   described_at_ = monotonic_now();
-  if (info.workload.dags.empty() || (flight_ && info.workload == described_)) return {};
+  const bool states_clock = info.clock.has_value();
+  if (info.workload.dags.empty()) return {};
+  if (flight_ && info.workload == described_ && states_clock == states_clock_) return {};
   described_ = info.workload;
+  states_clock_ = states_clock;
   if (flight_) return flight_->describe(info);
   const trace::FlightOptions options{.most_bytes = most_bytes_};
   Result<trace::FlightRecorder> created = trace::FlightRecorder::create(flight(), info, options);
@@ -91,7 +95,9 @@ void Recorder::collect(Time end) {
   const std::size_t tasks = described_.task_count();
   const bool has_new_task =
       std::any_of(events_.begin(), events_.end(), [&](const JobEvent &e) { return e.task.value >= tasks; });
-  if (has_new_task || end != kNever || monotonic_now() - described_at_ >= kDescribeEvery) state_ = describe_again();
+  const bool lacks_clock = !states_clock_ && engine_->has_origin();
+  const bool is_old = monotonic_now() - described_at_ >= kDescribeEvery;
+  if (has_new_task || lacks_clock || is_old || end != kNever) state_ = describe_again();
   if (state_ && flight_) state_ = flight_->append(events_, engine_->lost_events());
   if (state_ || end != kNever) return;
   std::fprintf(stderr, "%s: the record of the run ends here: %s\n", name_.c_str(), to_string(state_.error()).c_str());

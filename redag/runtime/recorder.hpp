@@ -62,6 +62,7 @@ class Recorder {
   std::string name_;
   std::optional<trace::FlightRecorder> flight_;  // from the first task on
   Workload described_;
+  bool states_clock_ = false;  // what was described does
   Time described_at_ = 0;
   std::vector<JobEvent> events_;
   Result<void> state_;  // the first error

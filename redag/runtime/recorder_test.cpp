@@ -15,7 +15,9 @@
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <vector>
 
+#include "redag/runtime/clock.hpp"
 #include "redag/runtime/executor.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag_analysis/metrics/summary.hpp"
@@ -110,6 +112,29 @@ TEST_F(Record, DagsThatComeAndGoAndEventsAreInIt) {
   EXPECT_EQ(recorded.info.workload.dags[2].name, "inspection");
   EXPECT_EQ(recorded.info.workload.dags[3].name, "inspection #2");
   EXPECT_GE(recorded.info.workload.dags[3].tasks[0].offset, 10 * kMillisecond) << "its grid begins when it was added";
+}
+
+// By it, records of several hosts are put on one clock.
+TEST_F(Record, TheClockOfTheSystemIsThatOfTheTimes) {
+  std::vector<Time> seen;
+  {
+    Executor executor(recording());
+    DagBuilder dag("dag");
+    dag.timer("t", 5ms, [&] { seen.push_back(detail::read_clock(CLOCK_REALTIME)); });
+    executor.add(std::move(dag));
+    executor.run_for(50ms);
+  }
+  const trace::Trace recorded = trace();
+  ASSERT_TRUE(recorded.info.clock);
+  const trace::ClockReading &clock = *recorded.info.clock;
+  const std::vector<metrics::JobRecord> jobs = metrics::fold_jobs(recorded.info.workload, recorded.events);
+  ASSERT_GE(jobs.size(), seen.size());
+  ASSERT_FALSE(seen.empty());
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    const Time time = seen[i] - clock.system + clock.at;  // in the time of the run
+    EXPECT_GE(time, jobs[i].start - clock.error);
+    EXPECT_LE(time, jobs[i].finish + clock.error);
+  }
 }
 
 TEST_F(Record, AnEarlierRunIsReplacedAndAnUnfinishedOneIsMovedAside) {

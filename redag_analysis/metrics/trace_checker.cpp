@@ -175,11 +175,15 @@ RuleSet rules_for(const trace::RunInfo &info) {
 class TraceChecker::Impl {
  public:
   Impl(const trace::RunInfo &run, const RuleSet &rules) : parts_(parts_of(run.workload)), places_(places_in(parts_)) {
-    for (const ClusterPart &part : parts_) {
+    for (std::uint32_t p = 0; p < parts_.size(); ++p) {
       trace::RunInfo info = run;
-      info.workload = part.workload;
-      info.config = sched::config_of(info.config, part);
-      checkers_.emplace_back(std::move(info), part, rules, report_);
+      info.workload = parts_[p].workload;
+      info.config = sched::config_of(info.config, parts_[p]);
+      info.event_tasks.clear();
+      for (const TaskId task : run.event_tasks) {
+        if (places_[task.value].part == p) info.event_tasks.push_back(places_[task.value].task);
+      }
+      checkers_.emplace_back(std::move(info), parts_[p], rules, report_);
     }
   }
 

@@ -42,6 +42,22 @@ TEST(CheckTrace, AcceptsAGoodRun) {
   }
 }
 
+// As in a merged run of two hosts, of which the second one has a task that its program releases.
+TEST(CheckTrace, TasksWithoutAGridAreThoseOfTheirCluster) {
+  Workload workload = two_tasks();
+  workload.platform.workers = 2;
+  workload.platform.clusters = {{.name = "one", .workers = 1}, {.name = "two", .workers = 1}};
+  workload.dags[0].cluster = "one";
+  workload.dags[1].cluster = "two";
+  TraceBuilder t(workload);
+  t.at(0).arrives("hi", 0).dispatched("hi", 0, 0, 10).at(1).finished("hi", 0, 0);
+  t.at(3).arrives("lo", 0).dispatched("lo", 0, 1, 23).at(7).finished("lo", 0, 1);
+  trace::Trace trace = t.until(10);
+  expect_broken(trace, Rule::Grid);
+  trace.info.event_tasks = {TaskId(1)};
+  expect_kept(trace, Rule::Grid);
+}
+
 TEST(CheckTrace, NamesTheJobTheTimeAndTheRule) {
   trace::Trace trace = two_tasks_run().until(10);
   trace.events[5].value -= kMillisecond;  // finish of hi#0, as measured

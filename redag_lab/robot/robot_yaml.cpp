@@ -43,7 +43,8 @@ class RobotReader : private yaml::ValueReader {
       : ValueReader(file), root_(root), options_(options) {}
 
   Result<LoadedRobot> run() {
-    if (check_map(root_, "a robot", {"robot", "policy", "cpus", "cpu_sets", "processes", "links", "threads", "irqs"})) {
+    if (check_map(root_, "a robot",
+                  {"robot", "policy", "cpus", "cpu_sets", "hosts", "processes", "links", "threads", "irqs"})) {
       take(root_, "robot", robot_.name, [this](const Node &node, auto key) { return text(node, key); });
       take(root_, "policy", robot_.policy,
            [this](const Node &node, auto key) { return one_of(node, key, std::span<const PolicyKind>(kPolicies)); });
@@ -83,7 +84,11 @@ class RobotReader : private yaml::ValueReader {
   // Calls `read` for each item of a list, which may be absent.
   template <class Read>
   void read_list(std::string_view key, Names &names, Read read) {
-    const Node *node = find(root_, key);
+    read_list(root_, key, names, read);
+  }
+  template <class Read>
+  void read_list(const Node &map, std::string_view key, Names &names, Read read) {
+    const Node *node = find(map, key);
     if (node == nullptr || node->kind == Node::Kind::Null) return;
     if (node->kind != Node::Kind::Sequence) {
       wrong_type(*node, key, "a list");
@@ -95,7 +100,7 @@ class RobotReader : private yaml::ValueReader {
       is_broken_ = true;
       return;
     }
-    names.reserve(node->children.size());
+    names.reserve(names.size() + node->children.size());
     for (const Node &item : node->children) read(item);
   }
 
@@ -112,31 +117,77 @@ class RobotReader : private yaml::ValueReader {
     return false;
   }
 
+  // The robot is one host, or has several, each with its own processors.
   void read_cpu_sets() {
-    const Node *cpus_node = find(root_, "cpus");
-    const Node *sets = find(root_, "cpu_sets");
+    if (const Node *hosts = find(root_, "hosts")) {
+      for (const char *key : {"cpus", "cpu_sets"}) {
+        if (const Node *node = find(root_, key)) {
+          error(*node, fmt::format("the robot has both 'hosts' and '{}'", key), "give the processors to the hosts");
+          is_broken_ = true;
+        }
+      }
+      read_list("hosts", names_of_hosts_, [this](const Node &node) { read_host(node); });
+      if (robot_.hosts.empty() && !is_broken_) error(*hosts, "hosts is an empty list", "add {name: NAME, cpus: 0-3}");
+    } else {
+      read_processors(root_, "the robot", CpuSet());
+    }
+    is_broken_ = is_broken_ || robot_.cpu_sets.empty();
+  }
+
+  void read_host(const Node &node) {
+    CpuSet set;
+    owned_.clear();
+    set.host = robot_.hosts.size();
+    if (!check_map(node, "a host", {"name", "cpus", "cpu_sets"}) ||
+        !take_name(node, "a host", names_of_hosts_, set.host, set.name)) {
+      is_broken_ = true;
+      return;
+    }
+    robot_.hosts.push_back(set.name);
+    host_ = set.host;
+    read_processors(node, fmt::format("host '{}'", set.name), std::move(set));
+  }
+
+  // Reads 'cpus', which makes `set` complete, or 'cpu_sets'.
+  void read_processors(const Node &map, const std::string &what, CpuSet set) {
+    const Node *cpus_node = find(map, "cpus");
+    const Node *sets = find(map, "cpu_sets");
     if ((cpus_node == nullptr) == (sets == nullptr)) {
-      error(cpus_node == nullptr ? root_ : *cpus_node,
-            cpus_node == nullptr ? "the robot names no processors" : "the robot has both 'cpus' and 'cpu_sets'",
+      error(cpus_node == nullptr ? map : *cpus_node,
+            what + (cpus_node == nullptr ? " names no processors" : " has both 'cpus' and 'cpu_sets'"),
             "add 'cpus: 0-3' if all processes share them, or else 'cpu_sets:'");
       is_broken_ = true;
       return;
     }
     if (cpus_node != nullptr) {
-      CpuSet set;
-      is_broken_ = !take(root_, "cpus", set.cpus, [this](const Node &node, auto key) { return cpus(node, key); });
+      const bool is_sound = (set.name.empty() || is_new_set(*find(map, "name"), set.name)) &&
+                            take(map, "cpus", set.cpus, [this](const Node &node, auto key) { return cpus(node, key); });
+      is_broken_ = is_broken_ || !is_sound;
       robot_.cpu_sets.push_back(std::move(set));
       return;
     }
-    read_list("cpu_sets", names_of_sets_, [this](const Node &node) { read_cpu_set(node); });
-    if (robot_.cpu_sets.empty() && !is_broken_) {
-      error(*sets, "cpu_sets is an empty list", "add a set such as {name: all, cpus: 0-3}");
+    const std::size_t before = robot_.cpu_sets.size();
+    read_list(map, "cpu_sets", names_of_sets_, [this](const Node &node) { read_cpu_set(node); });
+    if (robot_.cpu_sets.size() > before || is_broken_) return;
+    error(*sets, "cpu_sets is an empty list", "add a set such as {name: all, cpus: 0-3}");
+    is_broken_ = true;
+  }
+
+  // The set of a host has the host's name, which is then the name of no other set.
+  bool is_new_set(const Node &at, const std::string &name) {
+    if (parse_cpu_list(name)) {
+      error(at, fmt::format("the name '{}' of a host is also a list of processors", name),
+            "choose a name such as 'vision'");
+      return false;
     }
-    is_broken_ = is_broken_ || robot_.cpu_sets.empty();
+    if (names_of_sets_.emplace(name, robot_.cpu_sets.size()).second) return true;
+    error(at, fmt::format("a CPU set of another host is called '{}' as well", name), "choose a unique name");
+    return false;
   }
 
   void read_cpu_set(const Node &node) {
     CpuSet set;
+    set.host = host_;
     bool is_sound = check_map(node, "a CPU set", {"name", "cpus"}) &&
                     take_name(node, "a CPU set", names_of_sets_, robot_.cpu_sets.size(), set.name);
     if (is_sound && parse_cpu_list(set.name)) {
@@ -338,7 +389,8 @@ class RobotReader : private yaml::ValueReader {
   void read_threads(const Node &node) {
     Threads threads;
     threads.place = place_of(node);
-    if (!check_map(node, "an entry of threads", {"name", "match", "level", "cpus", "count", "wcet", "period"}) ||
+    if (!check_map(node, "an entry of threads",
+                   {"name", "match", "host", "level", "cpus", "count", "wcet", "period"}) ||
         !take_name(node, "an entry of threads", names_of_threads_, robot_.threads.size(), threads.name)) {
       return;
     }
@@ -349,7 +401,8 @@ class RobotReader : private yaml::ValueReader {
             "add 'match: {thread: NAME}' or 'match: {process: PROCESS, thread: NAME}'");
     }
     if (const Node *level = find(node, "level")) threads.level = read_level(*level);
-    if (const Node *cpus_node = find(node, "cpus")) threads.cpus = read_cpus(*cpus_node);
+    threads.host = host_of_threads(node, threads);
+    if (const Node *cpus_node = find(node, "cpus")) threads.cpus = read_cpus(*cpus_node, threads.host);
     if (find(node, "level") == nullptr && find(node, "cpus") == nullptr) {
       error(node, fmt::format("threads '{}' have neither a level nor cpus", threads.name),
             "add 'level:' or 'cpus:', or remove the entry");
@@ -365,6 +418,49 @@ class RobotReader : private yaml::ValueReader {
             "remove 'cpus:'");
     }
     robot_.threads.push_back(std::move(threads));
+  }
+
+  // Threads are on the host of their process, or of the task that they execute.
+  std::size_t host_of_threads(const Node &node, const Threads &threads) {
+    std::optional<std::size_t> host;
+    if (threads.process && !is_broken_) host = host_of(robot_, *threads.process);
+    if (threads.level && threads.level->kind == Level::Kind::Task && !is_broken_) {
+      const std::size_t of_task = host_of(robot_, threads.level->task.process);
+      if (host && *host != of_task) {
+        error(*find(node, "level"),
+              fmt::format("threads '{}' are on host '{}', and task '{}' is on host '{}'", threads.name,
+                          robot_.hosts[*host], threads.level->task.name, robot_.hosts[of_task]),
+              "choose a task of the same host");
+      }
+      host = of_task;
+    }
+    return read_host_of(node, fmt::format("threads '{}'", threads.name), host);
+  }
+
+  // Reads the host of an entry, which `known` tells otherwise.
+  std::size_t read_host_of(const Node &node, const std::string &what, std::optional<std::size_t> known) {
+    const Node *host = find(node, "host");
+    if (host == nullptr) {
+      if (!known && !robot_.hosts.empty() && !is_broken_) {
+        error(node, fmt::format("nothing says on which host {} are", what),
+              fmt::format("add 'host:' with one of {}", fmt::join(robot_.hosts, ", ")));
+      }
+      return known.value_or(0);
+    }
+    const auto found = names_of_hosts_.find(host->text);
+    if (host->kind != Node::Kind::Scalar || found == names_of_hosts_.end()) {
+      if (is_broken_) return 0;
+      const std::vector<std::string_view> names(robot_.hosts.begin(), robot_.hosts.end());
+      error(*host, fmt::format("there is no host {}", describe(*host)),
+            names.empty() ? "remove 'host:': the robot has no 'hosts:'"
+                          : did_you_mean(host->text, names, "add it to 'hosts:'"));
+      return known.value_or(0);
+    }
+    if (known && *known != found->second) {
+      error(*host, fmt::format("{} are on host '{}' by their process or task", what, robot_.hosts[*known]),
+            "remove 'host:'");
+    }
+    return found->second;
   }
 
   // A load is what the analysis has to know of threads that interfere with tasks.
@@ -495,8 +591,16 @@ class RobotReader : private yaml::ValueReader {
   }
 
   // Reads the name of a CPU set, or processors.
-  std::vector<int> read_cpus(const Node &node) {
-    if (const auto set = set_named(node)) return robot_.cpu_sets[*set].cpus;
+  std::vector<int> read_cpus(const Node &node, std::size_t host) {
+    if (const auto set = set_named(node)) {
+      const CpuSet &found = robot_.cpu_sets[*set];
+      if (found.host == host) return found.cpus;
+      error(node,
+            fmt::format("CPU set '{}' is on host '{}', and these are on host '{}'", found.name,
+                        robot_.hosts[found.host], robot_.hosts[host]),
+            "choose a CPU set of the same host");
+      return {};
+    }
     if (node.kind == Node::Kind::Scalar && !parse_cpu_list(node.text)) {
       if (is_broken_) return {};
       wrong_type(node, "cpus", "a CPU set or a list of processors such as 0-3");
@@ -511,7 +615,7 @@ class RobotReader : private yaml::ValueReader {
   void read_interrupts(const Node &node) {
     Interrupts interrupts;
     interrupts.place = place_of(node);
-    if (!check_map(node, "an entry of irqs", {"name", "match", "cpus"}) ||
+    if (!check_map(node, "an entry of irqs", {"name", "match", "cpus", "host"}) ||
         !take_name(node, "an entry of irqs", names_of_interrupts_, robot_.interrupts.size(), interrupts.name)) {
       return;
     }
@@ -521,7 +625,8 @@ class RobotReader : private yaml::ValueReader {
     }
     take_text(node, "match", interrupts.match);
     if (const Node *cpus_node = find(node, "cpus")) {
-      interrupts.cpus = read_cpus(*cpus_node);
+      interrupts.host = read_host_of(node, fmt::format("irqs '{}'", interrupts.name), std::nullopt);
+      interrupts.cpus = read_cpus(*cpus_node, interrupts.host);
     } else {
       error(node, fmt::format("irqs '{}' have no cpus", interrupts.name), "add 'cpus:'");
     }
@@ -534,12 +639,14 @@ class RobotReader : private yaml::ValueReader {
   Diagnostics of_other_files_;
   // Some entry is lost: names that are unknown may be its own.
   bool is_broken_ = false;
+  Names names_of_hosts_;
+  std::size_t host_ = 0;  // whose processors are read
   Names names_of_sets_;
   Names names_of_processes_;
   Names targets_;  // of links
   Names names_of_threads_;
   Names names_of_interrupts_;
-  std::unordered_set<int> owned_;  // processors of CPU sets
+  std::unordered_set<int> owned_;  // processors of the CPU sets of a host
   std::unordered_map<std::string, std::pair<std::size_t, TaskId>> tasks_;
 };
 

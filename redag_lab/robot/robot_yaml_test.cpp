@@ -44,6 +44,97 @@ std::string findings(const std::string &text) {
 
 std::string with_threads(const std::string &entry) { return std::string(kBase) + "threads:\n  - " + entry + "\n"; }
 
+constexpr const char *kTwoHosts = R"(robot: cart
+hosts:
+  - {name: vision, cpus: 0-3}
+  - name: drive
+    cpu_sets: [{name: control, cpus: 0}, {name: rest, cpus: 1-3}]
+processes:
+  - name: camera
+    match: {name: camera_node}
+    cpus: vision
+    workload: {dags: [{name: look, tasks: [{name: grab, wcet: 1ms, period: 30ms}]}]}
+  - name: base
+    match: {name: base_node}
+    cpus: control
+    workload:
+      dags:
+        - {name: control, tasks: [{name: pid, wcet: 1ms, period: 5ms}]}
+        - {name: brake, tasks: [{name: hit, wcet: 1ms, period: 30ms}]}
+  - {name: driver, match: {name: driver}, cpus: rest}
+)";
+
+TEST(RobotYaml, HostsHaveProcessorsOfTheirOwn) {
+  const Result<LoadedRobot> loaded = read(std::string(kTwoHosts) + R"(links:
+  - {from: camera.look.grab, to: base.brake.hit, transport: 1ms}
+threads:
+  - {name: loop, match: {process: driver, thread: rx}, level: {task: base.control.pid}}
+  - {name: torch, match: {thread: "pt_*"}, level: {nice: 3}, cpus: "3", host: vision}
+irqs:
+  - {name: can, host: drive, match: "can*", cpus: rest}
+)");
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  const Robot &robot = loaded->robot;
+  EXPECT_EQ(robot.hosts, (std::vector<std::string>{"vision", "drive"}));
+  EXPECT_EQ(host_of(robot, 0), 0u);
+  EXPECT_EQ(host_of(robot, 1), 1u);
+  EXPECT_EQ(robot.threads[0].host, 1u) << "that of its process";
+  EXPECT_EQ(robot.threads[1].host, 0u);
+  EXPECT_EQ(robot.interrupts[0].cpus, (std::vector<int>{1, 2, 3}));
+
+  const Robot drive = part_of(robot, 1);
+  EXPECT_EQ(drive.name, "cart/drive");
+  EXPECT_TRUE(drive.hosts.empty());
+  ASSERT_EQ(drive.cpu_sets.size(), 2u);
+  ASSERT_EQ(drive.processes.size(), 2u);
+  EXPECT_EQ(drive.processes[0].cpu_set, 0u);
+  EXPECT_EQ(drive.processes[1].cpu_set, 1u);
+  ASSERT_EQ(drive.threads.size(), 1u);
+  EXPECT_EQ(drive.threads[0].process, 1u);
+  EXPECT_EQ(drive.threads[0].level->task.process, 0u);
+  EXPECT_EQ(drive.interrupts.size(), 1u);
+  EXPECT_TRUE(drive.links.empty()) << "the camera is elsewhere";
+  const Robot vision = part_of(robot, 0);
+  EXPECT_EQ(vision.processes.size(), 1u);
+  EXPECT_EQ(vision.threads.size(), 1u);
+  EXPECT_TRUE(vision.interrupts.empty());
+}
+
+TEST(RobotYaml, TheUnionOfHostsHasAClusterForEachSet) {
+  const Result<Input> input = parse_input(kTwoHosts, "cart.yaml");
+  ASSERT_TRUE(input && input->workload);
+  const Platform &platform = input->workload->workload.platform;
+  ASSERT_EQ(platform.clusters.size(), 2u);
+  EXPECT_EQ(platform.clusters[0].name, "vision");
+  EXPECT_EQ(platform.clusters[0].workers, 4u);
+  EXPECT_TRUE(platform.clusters[0].cpus.empty()) << "processor 0 of two hosts";
+  EXPECT_EQ(platform.clusters[1].name, "control");
+}
+
+TEST(RobotYaml, MistakesInHostsAreFound) {
+  const std::string two = kTwoHosts;
+  EXPECT_EQ(findings("cpus: 0\n" + two),
+            "cart.yaml:1:7: error: the robot has both 'hosts' and 'cpus' (give the processors to the hosts)");
+  EXPECT_EQ(findings(two + "irqs: [{name: can, match: can, cpus: 1}]\n"),
+            "cart.yaml:19:8: error: nothing says on which host irqs 'can' are (add 'host:' with one of vision, drive)");
+  EXPECT_EQ(
+      findings(two + "irqs: [{name: can, match: can, cpus: rest, host: vision}]\n"),
+      "cart.yaml:19:38: error: CPU set 'rest' is on host 'drive', and these are on host 'vision' (choose a CPU set of "
+      "the same host)");
+  EXPECT_EQ(findings(two + "irqs: [{name: can, match: can, cpus: 1, host: dirve}]\n"),
+            "cart.yaml:19:47: error: there is no host 'dirve' (did you mean 'drive'?)");
+  EXPECT_EQ(findings(two + "threads: [{name: t, match: {process: driver}, level: {task: camera.look.grab}}]\n"),
+            "cart.yaml:19:54: error: threads 't' are on host 'drive', and task 'camera.look.grab' is on host 'vision' "
+            "(choose a task of the same host)");
+  EXPECT_EQ(findings(std::string(kBase) + "irqs: [{name: can, match: can, cpus: 1, host: drive}]\n"),
+            "cart.yaml:16:47: error: there is no host 'drive' (remove 'host:': the robot has no 'hosts:')");
+  std::string same = two;
+  same.replace(same.find("name: control, cpus: 0"), 13, "name: vision");
+  EXPECT_NE(findings(same).find("cart.yaml:5:23: error: the name 'vision' is used by another entry of this list"),
+            std::string::npos)
+      << findings(same);
+}
+
 TEST(RobotYaml, ReadsEverything) {
   const Result<LoadedRobot> loaded = read(std::string(kBase) + R"(threads:
   - {name: loop, match: {process: driver, thread: "rx?"}, level: {task: base.control.pid}}

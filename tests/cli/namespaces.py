@@ -9,7 +9,8 @@ skipped without them.
 
 Each host has a steady clock (CLOCK_MONOTONIC) of its own, as computers that were started at different times. The system's
 clock cannot be another one in a namespace. That of the second host is therefore skewed where it is used: in the one
-reading that its record states, and in what it tells the other host. As all is one machine, the true times are known.
+reading that its record states, and in what it compares with the other host. As all is one machine, the readings before
+that give the true times.
 """
 import json
 import os
@@ -21,12 +22,13 @@ import time
 
 from program import PROGRAM, Case, main, redag
 
-EXAMPLE = PROGRAM.parent.parent / "examples" / "example_two_hosts"
+EXAMPLE = PROGRAM.parent.parent / "examples" / "hosts" / "example_two_hosts"
 UPTIME = {"vision": 86_400, "drive": 1_000_000}  # seconds beyond that of the machine
 ADDRESS = {"vision": "10.91.0.1", "drive": "10.91.0.2"}
 SKEW = 3_700_000  # ns: the system's clock of drive is ahead of that of vision
 CLOCK_PORT, DATA_PORT = 7401, 7400
-LINK = "vision.camera.detect,drive.avoid.obstacles,2ms"
+TRANSPORT = 25_000_000  # ns at most
+LINK = f"vision.camera.detect,drive.avoid.obstacles,{TRANSPORT}ns"
 
 
 def answer_with_the_time():
@@ -139,11 +141,17 @@ class TwoHosts(Case):
     def lines(self, folder):
         return [json.loads(line) for line in self.expect(redag("events", folder), 0).stdout.splitlines()]
 
+    def clock(self, folder):
+        """The system's clock at time 0 of a record."""
+        clock = self.lines(folder)[0]["run"]["clock"]
+        return clock["system_ns"] - clock["at_ns"]
+
     def skew(self, folder):
         """Lets the record have been made with a skewed clock of the system."""
         first, *rest = self.lines(folder)
         first["run"]["clock"]["system_ns"] += SKEW
-        (folder / "events.jsonl").write_text("".join(json.dumps(line) + "\n" for line in [first, *rest]).replace(", ", ","))
+        lines = [json.dumps(line, separators=(",", ":")) + "\n" for line in (first, *rest)]
+        (folder / "events.jsonl").write_text("".join(lines))
         (folder / "events.redag").unlink()
 
     def merge(self, folders, offset):
@@ -153,41 +161,51 @@ class TwoHosts(Case):
         return self.document(result, "redag.hosts/1")
 
     def times(self, folder, kind, task):
+        """The values of events, which are times, by the number of their jobs."""
         return {event[3]: event[5] for event in self.lines(folder)[1:-1] if event[1] == kind and event[2] == task}
 
     def test_merged_times_and_latencies_are_within_what_is_stated(self):
         low, high = self.measure_offset()
         folders = self.record()
-        released = self.times(folders["vision"], "released", 0)  # of the camera
+        shift = self.clock(folders["drive"]) - self.clock(folders["vision"])  # of drive's times, to those of vision
+        grabbed = self.times(folders["vision"], "released", 0)
+        detected = self.times(folders["vision"], "finished", 1)
+        seen = self.times(folders["drive"], "released", 0)
         braked = self.times(folders["drive"], "finished", 1)
+        for number, time_seen in seen.items():  # the n-th job of each host is that of one image
+            self.assertGreater(time_seen + shift, detected[number], "a datagram came before it was sent: 'shift' is wrong")
+        slowest = max(time_seen + shift - detected[number] for number, time_seen in seen.items())
+        if slowest > TRANSPORT:  # which the link states
+            self.skipTest(f"a busy machine: a datagram took {slowest} ns from one program to the other")
         self.skew(folders["drive"])
-        document = self.merge(folders, f"{(low + high) / 2000}us+-{(high - low) / 2000 + 0.001:.3f}us")
+        document = self.merge(folders, f"{(low + high) // 2}ns+-{(high - low) // 2 + 1}ns")
 
         hosts = {host["name"]: host for host in document["hosts"]}
-        true_shift = (UPTIME["vision"] - UPTIME["drive"]) * 1_000_000_000
-        error = hosts["drive"]["shift_ns"] - true_shift
+        self.assertEqual(hosts["vision"]["shift_ns"], 0)
+        error = hosts["drive"]["shift_ns"] - shift
         within = hosts["drive"]["within_ns"]
         self.assertLessEqual(abs(error), within)
-        self.assertEqual(hosts["vision"]["shift_ns"], 0)
+        merged = self.times(self.folder / "merged", "released", 3)
+        self.assertEqual({time - seen[number] for number, time in merged.items()}, {hosts["drive"]["shift_ns"]})
 
         (chain,) = document["chains"]
         self.assertEqual(chain["unmatched"], 0)
-        self.assertGreater(chain["answers"], 40)
+        self.assertGreater(chain["answers"], 35)
         largest = 0
         for answer in chain["worst"]:
             number = answer["job"]
-            latency = braked[number] + true_shift - released[number]  # the n-th job of each host is that of one image
+            latency = braked[number] + shift - grabbed[number]
             self.assertLessEqual(answer["low_ns"], latency)
             self.assertGreaterEqual(answer["high_ns"], latency)
-            largest = max(largest, abs((answer["low_ns"] + answer["high_ns"]) // 2 - latency))
-        print(f"clocks of the system: {SKEW} ns apart, read as {low} to {high} ns; times of drive: wrong by {error} ns, stated "
-              f"+-{within} ns; {chain['answers']} answers, middle of the bounds wrong by {largest} ns at most")
+            if not answer["ambiguous"]:
+                largest = max(largest, abs((answer["low_ns"] + answer["high_ns"]) // 2 - latency))
+        print(f"clocks {SKEW} ns apart, read as {low} to {high} ns; merged times wrong by {error} ns, stated +-{within} ns; "
+              f"{chain['answers']} answers, the middle of their bounds wrong by {largest} ns at most")
 
-        # A statement that is wrong gives times that are wrong: what was checked above is not true of any.
+        # A statement that is wrong gives times that are wrong: not every one passes the checks above.
         wrong = self.merge(folders, "0+-100us")
         drive = next(host for host in wrong["hosts"] if host["name"] == "drive")
-        self.assertGreater(abs(drive["shift_ns"] - true_shift), drive["within_ns"])
-        self.assertGreater(wrong["chains"][0]["unmatched"], 0)
+        self.assertGreater(abs(drive["shift_ns"] - shift), drive["within_ns"])
 
 
 if __name__ == "__main__":

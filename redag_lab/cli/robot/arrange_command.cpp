@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "redag/base/nearest.hpp"
+#include "redag/base/provenance.hpp"
 #include "redag/base/text.hpp"
 #include "redag/runtime/threads.hpp"
 #include "redag_lab/cli/robot/arrange_report.hpp"
@@ -41,6 +42,7 @@ struct Options {
   std::uint32_t rtprio = 0;  // 0: what this process may use
   std::string state;
   std::string levels;  // name of a process
+  std::string host;
 
   [[nodiscard]] bool changes_something() const { return apply || watch; }
 };
@@ -58,6 +60,46 @@ std::optional<robot::Robot> load_robot(const std::string &file, Console &console
     return std::nullopt;
   }
   return std::move(input->robot);
+}
+
+std::optional<std::size_t> process_of_levels(const Options &options, const robot::Robot &robot, Console &console) {
+  std::vector<std::string> names;
+  for (std::size_t p = 0; p < robot.processes.size(); ++p) {
+    if (robot.processes[p].name == options.levels) return p;
+    names.push_back(robot.processes[p].name);
+  }
+  console.error(fmt::format("--levels: there is no process {}", in_quotes(options.levels)),
+                suggestion(options.levels, names));
+  return std::nullopt;
+}
+
+// Returns what is on the host that the user names, or that has the process of --levels or the name of this machine.
+std::optional<robot::Robot> part_here(const Options &options, robot::Robot robot, Console &console) {
+  if (robot.hosts.empty()) {
+    if (options.host.empty()) return robot;
+    console.error(fmt::format("--host: {} has no hosts", options.file), "list them under 'hosts:', see docs/robot.md");
+    return std::nullopt;
+  }
+  const auto part = [&](const std::string &name) -> std::optional<robot::Robot> {
+    const auto found = std::find(robot.hosts.begin(), robot.hosts.end(), name);
+    if (found == robot.hosts.end()) return std::nullopt;
+    return part_of(robot, static_cast<std::size_t>(found - robot.hosts.begin()));
+  };
+  if (!options.host.empty()) {
+    if (std::optional<robot::Robot> named = part(options.host)) return named;
+    console.error(fmt::format("--host: there is no host {}", in_quotes(options.host)),
+                  suggestion(options.host, robot.hosts));
+    return std::nullopt;
+  }
+  if (!options.levels.empty()) {
+    const std::optional<std::size_t> process = process_of_levels(options, robot, console);
+    return process ? std::optional(part_of(robot, host_of(robot, *process))) : std::nullopt;
+  }
+  const std::string machine = current_provenance().host;
+  if (std::optional<robot::Robot> own = part(machine)) return own;
+  console.error(fmt::format("{} has several hosts, and this machine, '{}', is none of them", options.file, machine),
+                fmt::format("name one of them: --host {}", fmt::join(robot.hosts, ", --host ")));
+  return std::nullopt;
 }
 
 // Returns the priorities to plan with. A plan alone needs no right to use them.
@@ -92,24 +134,15 @@ std::optional<std::string> state_file(const Options &options, const robot::Robot
 }
 
 int print_levels(const Options &options, const robot::Robot &robot, const robot::Plan &plan, Console &console) {
-  std::vector<std::string> names;
-  for (std::size_t p = 0; p < robot.processes.size(); ++p) {
-    const std::string &name = robot.processes[p].name;
-    if (name != options.levels) {
-      names.push_back(name);
-      continue;
-    }
-    if (!plan.of_executor[p].empty()) {
-      console.print(robot::levels_text(plan.of_executor[p]) + "\n");
-      return kExitOk;
-    }
-    console.error(fmt::format("--levels: process '{}' has no executor of ReDAG-RT", name),
+  const std::optional<std::size_t> process = process_of_levels(options, robot, console);
+  if (!process) return kExitBad;
+  if (plan.of_executor[*process].empty()) {
+    console.error(fmt::format("--levels: process '{}' has no executor of ReDAG-RT", options.levels),
                   "only a process with a 'workload' that no threads execute has levels of its own");
     return kExitBad;
   }
-  console.error(fmt::format("--levels: there is no process {}", in_quotes(options.levels)),
-                suggestion(options.levels, names));
-  return kExitBad;
+  console.print(robot::levels_text(plan.of_executor[*process]) + "\n");
+  return kExitOk;
 }
 
 robot::Changes changes_now(const robot::Robot &robot, const robot::Plan &plan, const robot::System &system) {
@@ -195,7 +228,9 @@ int watch(const Options &options, const robot::Robot &robot, const robot::Plan &
 }
 
 int arrange(const Options &options, Console &console) {
-  const std::optional<robot::Robot> loaded = load_robot(options.file, console);
+  std::optional<robot::Robot> whole = load_robot(options.file, console);
+  if (!whole) return kExitBad;
+  const std::optional<robot::Robot> loaded = part_here(options, *std::move(whole), console);
   if (!loaded) return kExitBad;
   const robot::Robot &robot = *loaded;
   const robot::System system;
@@ -246,6 +281,10 @@ Action add_arrange(CLI::App &app) {
   CLI::Option *const levels =
       app.add_option("--levels", options->levels, "Print REDAG_LEVELS for the executor of one process")
           ->type_name("PROCESS");
+  app.add_option(
+         "--host", options->host,
+         "Host of the robot whose part is meant (default: that of the process, or with the name of this machine)")
+      ->type_name("HOST");
   const std::vector<CLI::Option *> modes = {dry, apply, watch, undo, levels};
   for (CLI::Option *const mode : modes) {
     for (CLI::Option *const other : modes) {
