@@ -292,7 +292,7 @@ void Lockstep::start_instant() {
   parts_.engine.pause();
   clocks_.set(order_.time);
   parts_.registry.while_unchanged([this] {
-    for (const auto &callback : callbacks_) callback->begin_instant(turn());
+    for (const auto &callback : callbacks_) callback->begin_instant(++turn_);
   });
   parts_.engine.resume();
 }
@@ -321,13 +321,15 @@ void Lockstep::end_instant() {
   report(Report::Kind::Done);
 }
 
-Time Lockstep::turn() {
-  return running_.load(std::memory_order_relaxed) ? turn_.fetch_add(1, std::memory_order_relaxed) + 1
-                                                  : std::max(parts_.engine.now(), turn_.load());
+// What one job publishes has one turn: the order in which the middleware hands it to several callbacks plays no part.
+Time Lockstep::turn() const {
+  return running_.load(std::memory_order_relaxed) ? turn_.load() : std::max(parts_.engine.now(), turn_.load());
 }
 
 void Lockstep::ran(const Callback &callback) {
-  if (!running_.load(std::memory_order_relaxed) || is_ros_internal(callback.id())) return;
+  if (!running_.load(std::memory_order_relaxed)) return;
+  if (is_ros_internal(callback.id())) return;
+  ++turn_;
   jobs_.fetch_add(1, std::memory_order_relaxed);
   hash_.store(hash(hash_.load(std::memory_order_relaxed), to_string(callback.id())), std::memory_order_relaxed);
 }

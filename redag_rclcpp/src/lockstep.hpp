@@ -60,7 +60,7 @@ class Lockstep {
   /// True while a player is followed: its messages and simulated timers wait for an instant.
   [[nodiscard]] bool follows() const { return follows_; }
   /// The turn of a job that is released now.
-  [[nodiscard]] Time turn();
+  [[nodiscard]] Time turn() const;
   /// Wakes the thread that waits for messages of the player. The caller holds no lock of this package.
   void arrived() { parts_.wake(); }
   /// Something was released that is in no recording: by a clock on the wall, or by a message from elsewhere.

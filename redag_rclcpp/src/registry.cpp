@@ -16,6 +16,19 @@ namespace redag_rclcpp {
 
 using redag::Task;
 
+namespace {
+
+/// The scheduler breaks ties by ranks, then by ids. Ids depend on the order in which nodes were added, and a launch
+/// file may load components in any order. This keeps the order of `rank`, and among equals makes one of the names.
+std::uint32_t rank_by_name(std::uint32_t rank, const redag::CallbackId &id) {
+  constexpr std::uint32_t kNameBits = 20;
+  std::uint32_t hash = 0x811c9dc5;  // FNV-1a
+  for (const char c : to_string(id)) hash = (hash ^ static_cast<unsigned char>(c)) * 0x01000193;
+  return rank << kNameBits | hash >> (32 - kNameBits);
+}
+
+}  // namespace
+
 Registry::Registry(rclcpp::Context::SharedPtr context, const ReDAGOptions &options, std::uint32_t workers,
                    const Parts &parts)
     : context_(std::move(context)), options_(options), workers_(workers), parts_(parts) {
@@ -221,6 +234,7 @@ void Registry::add(const Entity &found) {
   if (entry.id.name.empty() || found.owner != nullptr) entry.id.index = next_index_[{entry.id.node, kind}]++;
   entry.in_default_group = found.in_default_group;
   place(entry, found);
+  if (options_.lockstep) entry.rank = rank_by_name(entry.rank, entry.id);
 
   const std::shared_ptr<Callback> callback = found.make(executor_.lock(), entry.id);
   entry.callback = callback;

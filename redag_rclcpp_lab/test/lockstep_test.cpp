@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cstdlib>
 #include <iostream>
@@ -84,8 +85,10 @@ class Robot {
                                })));
   }
 
-  void add_to(ReDAGExecutor &executor) {
-    for (const auto &one : {fuse_, plan_, control_}) executor.add_node(one);
+  void add_to(ReDAGExecutor &executor, bool in_order = true) {
+    std::vector<rclcpp::Node::SharedPtr> nodes{fuse_, plan_, control_};
+    if (!in_order) std::reverse(nodes.begin(), nodes.end());
+    for (const auto &one : nodes) executor.add_node(one);
   }
 
   rclcpp::Node::SharedPtr node(const std::string &name) {
@@ -222,7 +225,7 @@ TEST_P(LockstepReplays, HaveTheSameOrderAndOutputs) {
     ReDAGOptions options = this->options();
     options.lockstep = in_lockstep;
     ReDAGExecutor executor(options);
-    robot.add_to(executor);
+    robot.add_to(executor, i % 2 == 0);
     const Spinner spinner(executor);
     PlayOptions how = play(i);
     if (!in_lockstep) {
