@@ -101,8 +101,8 @@ class DeadlockDetector::Picture {
   struct Block {
     enum class Kind : std::uint8_t { Group, Dag, Workers };
     Kind kind = Kind::Group;
-    std::set<std::size_t> tops;  // each of them could end it
-    std::size_t holder = 0;      // Group: index in jobs_
+    std::set<std::size_t> tops = {};  // each of them could end it
+    std::size_t holder = 0;           // Group: index in jobs_
   };
   /// A job waits for an input that was not taken.
   struct Edge {
