@@ -93,13 +93,17 @@ std::uint32_t policy_of(Scheduling::Class kind) {
 std::optional<Scheduling> scheduling_of(pid_t tid) {
   Attributes attributes;
   if (syscall(SYS_sched_getattr, tid, &attributes, sizeof(attributes), 0U) != 0) return std::nullopt;
-  return Scheduling{.kind = class_of(attributes.policy),
-                    .priority = static_cast<int>(attributes.priority),
-                    .nice = attributes.nice,
-                    .resets_on_fork = (attributes.flags & kResetOnFork) != 0,
-                    .budget = static_cast<Duration>(attributes.runtime),
-                    .deadline = static_cast<Duration>(attributes.deadline),
-                    .period = static_cast<Duration>(attributes.period)};
+  Scheduling scheduling{.kind = class_of(attributes.policy),
+                        .priority = static_cast<int>(attributes.priority),
+                        .nice = attributes.nice,
+                        .resets_on_fork = (attributes.flags & kResetOnFork) != 0};
+  // For ordinary threads, Linux 6.12 and later put a time slice in the same place.
+  if (scheduling.kind == Scheduling::Class::Deadline) {
+    scheduling.budget = static_cast<Duration>(attributes.runtime);
+    scheduling.deadline = static_cast<Duration>(attributes.deadline);
+    scheduling.period = static_cast<Duration>(attributes.period);
+  }
+  return scheduling;
 }
 
 std::optional<std::vector<int>> affinity_of(pid_t tid) {
