@@ -17,6 +17,7 @@
 #include <ament_index_cpp/get_package_prefix.hpp>
 #include <ament_index_cpp/get_package_share_directory.hpp>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -266,20 +267,28 @@ Options parse(const std::vector<std::string> &arguments) {
     }
     return value;
   };
+  const auto whole = [&](const std::string &option, const std::string &text) {
+    const double value = number(option, text);
+    if (value != std::floor(value) || value > 1e6) {
+      throw std::invalid_argument(
+          fmt::format("{} is '{}', but must be a whole number of at most 1000000", option, text));
+    }
+    return static_cast<int>(value);
+  };
   for (std::size_t i = 0; i < arguments.size(); i += 2) {
     const std::string &option = arguments[i];
     if (i + 1 == arguments.size()) throw std::invalid_argument(option + " needs a value, or is no option (see --help)");
     const std::string &value = arguments[i + 1];
     if (option == "--rounds") {
-      options.rounds = static_cast<int>(number(option, value));
+      options.rounds = whole(option, value);
     } else if (option == "--seconds") {
       options.seconds = number(option, value);
     } else if (option == "--only") {
       options.only = value;
     } else if (option == "--width") {
-      options.width = static_cast<int>(number(option, value));
+      options.width = whole(option, value);
     } else if (option == "--height") {
-      options.height = static_cast<int>(number(option, value));
+      options.height = whole(option, value);
     } else if (option == "--rate") {
       options.rate = number(option, value);
     } else if (option == "--control") {
@@ -295,6 +304,9 @@ Options parse(const std::vector<std::string> &arguments) {
   if (options.config.empty()) {
     options.config =
         ament_index_cpp::get_package_share_directory("redag_rclcpp") + "/config/stacks/image_pipeline.yaml";
+  }
+  if (options.config != "none" && !std::filesystem::is_regular_file(options.config)) {
+    throw std::invalid_argument(fmt::format("--config: there is no file '{}'", options.config));
   }
   return options;
 }
