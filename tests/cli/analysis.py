@@ -274,6 +274,12 @@ dags:
             self.expect(redag("analyze", file), 0)
             self.expect(redag("analyze", file, "--preemption", "none"), 0)
 
+    def test_workloads_of_the_ros_package(self):
+        files = sorted((SOURCE / "redag_rclcpp" / "config").rglob("*.yaml"))
+        self.assertGreaterEqual(len(files), 2)
+        for file in files:
+            self.expect(redag("validate", "--strict", file), 0)
+
     def test_narrow_terminal(self):
         status, text = in_terminal("analyze", self.cart, "--all", columns=50, NO_COLOR="1")
         self.assertEqual(status, 0, text)

@@ -1,0 +1,248 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// The components around image_proc's for bench_image_pipeline: a synthetic camera, a viewer that measures how old its
+// frames are, and a control loop that measures how late it is called. The viewer and the control loop write their
+// figures as JSON to the file `report` when they are destroyed. They leave out the first `warm_up` seconds.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "rclcpp/rclcpp.hpp"
+#include "rclcpp_components/register_node_macro.hpp"
+#include "redag/runtime/clock.hpp"
+#include "sensor_msgs/image_encodings.hpp"
+#include "sensor_msgs/msg/camera_info.hpp"
+#include "sensor_msgs/msg/image.hpp"
+
+namespace redag_rclcpp::lab {
+
+using redag::Duration;
+using redag::Time;
+using redag::runtime::monotonic_now;
+using sensor_msgs::msg::CameraInfo;
+using sensor_msgs::msg::Image;
+
+namespace {
+
+Duration read_seconds(rclcpp::Node &node, const char *name, double initial) {
+  return std::llround(node.declare_parameter<double>(name, initial) * static_cast<double>(redag::kSecond));
+}
+
+/// One call of a timer, compared with the timer's grid.
+struct Call {
+  Time nominal = 0;          // the point of the grid that the call is for
+  Duration lateness = 0;     // since the first point that no call was for
+  std::int64_t skipped = 0;  // points before `nominal` that no call was for
+};
+
+/// Compares a timer's calls with its grid. rclcpp drops the points that have passed when it calls a timer late.
+class Grid {
+ public:
+  explicit Grid(Duration period) : period_(period) {}
+
+  /// To be called at the start of the timer's callback.
+  Call next(rclcpp::TimerBase &timer) {
+    const Time now = monotonic_now();
+    Call call;
+    call.nominal = now + timer.time_until_trigger().count() - period_;
+    call.lateness = now - call.nominal;
+    if (last_) {
+      call.skipped = std::max<std::int64_t>(
+          0, std::llround(static_cast<double>(call.nominal - *last_) / static_cast<double>(period_)) - 1);
+      call.lateness += call.skipped * period_;
+    }
+    last_ = call.nominal;
+    return call;
+  }
+
+ private:
+  Duration period_;
+  std::optional<Time> last_;
+};
+
+/// Durations in the order in which they were measured.
+class Samples {
+ public:
+  void add(Duration value) { values_.push_back(value); }
+  [[nodiscard]] std::size_t size() const { return values_.size(); }
+
+  /// In milliseconds; empty without samples.
+  [[nodiscard]] nlohmann::json summary() const {
+    if (values_.empty()) return nlohmann::json::object();
+    std::vector<Duration> sorted = values_;
+    std::sort(sorted.begin(), sorted.end());
+    const auto at = [&](double rank) {
+      const auto last = static_cast<double>(sorted.size() - 1);
+      return static_cast<double>(sorted[static_cast<std::size_t>(rank * last)]) / redag::kMillisecond;
+    };
+    return {{"p50", at(0.5)}, {"p99", at(0.99)}, {"max", at(1)}};
+  }
+
+ private:
+  std::vector<Duration> values_;
+};
+
+void write_report(const rclcpp::Node &node, const std::string &file, const nlohmann::json &figures) {
+  std::ofstream out(file);
+  out << figures << "\n";
+  if (!out.flush()) RCLCPP_ERROR(node.get_logger(), "cannot write the parameter report's file '%s'", file.c_str());
+}
+
+}  // namespace
+
+/// Publishes `image_raw` (a Bayer pattern) and `camera_info` (of a lens with distortion) every `period` seconds. A
+/// frame's stamp is the time at which the timer should have called.
+class Camera : public rclcpp::Node {
+ public:
+  explicit Camera(const rclcpp::NodeOptions &options)
+      : Node("camera", options), period_(read_seconds(*this, "period", 1.0 / 30)), grid_(period_) {
+    image_.encoding = sensor_msgs::image_encodings::BAYER_RGGB8;
+    image_.width = static_cast<std::uint32_t>(declare_parameter<int>("width", 640));
+    image_.height = static_cast<std::uint32_t>(declare_parameter<int>("height", 480));
+    image_.step = image_.width;
+    image_.header.frame_id = "camera";
+    image_.data.resize(std::size_t{image_.step} * image_.height);
+    for (std::size_t i = 0; i < image_.data.size(); ++i) {
+      image_.data[i] = static_cast<std::uint8_t>(i % image_.width + i / image_.width);
+    }
+    info_.header.frame_id = "camera";
+    info_.width = image_.width;
+    info_.height = image_.height;
+    info_.distortion_model = "plumb_bob";
+    info_.d = {-0.3, 0.1, 0.001, -0.001, 0};
+    const double focal = 0.8 * image_.width;
+    const double x = image_.width / 2.0;
+    const double y = image_.height / 2.0;
+    info_.k = {focal, 0, x, 0, focal, y, 0, 0, 1};
+    info_.r = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+    info_.p = {focal, 0, x, 0, 0, focal, y, 0, 0, 0, 1, 0};
+    images_ = create_publisher<Image>("image_raw", rclcpp::SensorDataQoS());
+    infos_ = create_publisher<CameraInfo>("camera_info", rclcpp::SensorDataQoS());
+    timer_ = create_wall_timer(std::chrono::nanoseconds(period_), [this] { capture(); });
+  }
+
+ private:
+  void capture() {
+    const Call call = grid_.next(*timer_);
+    image_.header.stamp = now() - rclcpp::Duration(std::chrono::nanoseconds(monotonic_now() - call.nominal));
+    info_.header.stamp = image_.header.stamp;
+    images_->publish(image_);
+    infos_->publish(info_);
+  }
+
+  Duration period_;
+  Grid grid_;
+  Image image_;
+  CameraInfo info_;
+  rclcpp::Publisher<Image>::SharedPtr images_;
+  rclcpp::Publisher<CameraInfo>::SharedPtr infos_;
+  rclcpp::TimerBase::SharedPtr timer_;
+};
+
+/// Subscribes to `image`. Reports the age of the frames at their arrival, and how many of the camera's frames (one
+/// every `period` seconds) did not come.
+class Viewer : public rclcpp::Node {
+ public:
+  explicit Viewer(const rclcpp::NodeOptions &options)
+      : Node("viewer", options),
+        period_(read_seconds(*this, "period", 1.0 / 30)),
+        warm_up_(read_seconds(*this, "warm_up", 2)),
+        report_(declare_parameter<std::string>("report", "")),
+        subscription_(create_subscription<Image>("image", rclcpp::SensorDataQoS(),
+                                                 [this](Image::ConstSharedPtr image) { view(*image); })) {}
+  Viewer(const Viewer &) = delete;
+  Viewer &operator=(const Viewer &) = delete;
+
+  ~Viewer() override {
+    if (report_.empty()) return;
+    const std::int64_t expected =
+        latencies_.size() == 0
+            ? 0
+            : std::llround(static_cast<double>(last_stamp_ - first_stamp_) / static_cast<double>(period_)) + 1;
+    write_report(*this, report_,
+                 {{"frames", latencies_.size()},
+                  {"lost", expected - static_cast<std::int64_t>(latencies_.size())},
+                  {"latency", latencies_.summary()}});
+  }
+
+ private:
+  void view(const Image &image) {
+    const Time arrival = now().nanoseconds();
+    if (!begin_) begin_ = arrival + warm_up_;
+    const Time stamp = rclcpp::Time(image.header.stamp).nanoseconds();
+    if (stamp < *begin_) return;
+    if (latencies_.size() == 0) first_stamp_ = stamp;
+    last_stamp_ = stamp;
+    latencies_.add(arrival - stamp);
+  }
+
+  Duration period_;
+  Duration warm_up_;
+  std::string report_;
+  std::optional<Time> begin_;
+  Time first_stamp_ = 0;
+  Time last_stamp_ = 0;
+  Samples latencies_;
+  rclcpp::Subscription<Image>::SharedPtr subscription_;
+};
+
+/// A timer of `period` seconds, each call of which uses the processor for `load` seconds. Reports how late it was
+/// called, and the points of its grid that it missed: those that no call was for, and calls that ended after the next
+/// point.
+class Control : public rclcpp::Node {
+ public:
+  explicit Control(const rclcpp::NodeOptions &options)
+      : Node("control", options),
+        period_(read_seconds(*this, "period", 0.002)),
+        load_(read_seconds(*this, "load", 0.0003)),
+        warm_up_(read_seconds(*this, "warm_up", 2)),
+        report_(declare_parameter<std::string>("report", "")),
+        grid_(period_),
+        timer_(create_wall_timer(std::chrono::nanoseconds(period_), [this] { control(); })) {}
+  Control(const Control &) = delete;
+  Control &operator=(const Control &) = delete;
+
+  ~Control() override {
+    if (report_.empty()) return;
+    write_report(*this, report_, {{"points", points_}, {"missed", missed_}, {"lateness", latenesses_.summary()}});
+  }
+
+ private:
+  void control() {
+    const Call call = grid_.next(*timer_);
+    const Time start = monotonic_now();
+    const Time used = redag::runtime::thread_cpu_now();
+    while (redag::runtime::thread_cpu_now() - used < load_) {
+    }
+    if (!begin_) begin_ = start + warm_up_;
+    if (start < *begin_) return;
+    points_ += call.skipped + 1;
+    missed_ += call.skipped + (monotonic_now() > call.nominal + period_ ? 1 : 0);
+    latenesses_.add(call.lateness);
+  }
+
+  Duration period_;
+  Duration load_;
+  Duration warm_up_;
+  std::string report_;
+  Grid grid_;
+  std::optional<Time> begin_;
+  std::int64_t points_ = 0;
+  std::int64_t missed_ = 0;
+  Samples latenesses_;
+  rclcpp::TimerBase::SharedPtr timer_;
+};
+
+}  // namespace redag_rclcpp::lab
+
+RCLCPP_COMPONENTS_REGISTER_NODE(redag_rclcpp::lab::Camera)
+RCLCPP_COMPONENTS_REGISTER_NODE(redag_rclcpp::lab::Viewer)
+RCLCPP_COMPONENTS_REGISTER_NODE(redag_rclcpp::lab::Control)
