@@ -217,6 +217,7 @@ using Figures = std::map<std::string, double>;
 
 /// One run of a container. Throws if it does not go to its end.
 Figures measure(const Container &container, const Options &options, const std::string &folder, const std::string &log) {
+  for (const char *report : {"/control", "/viewer"}) std::filesystem::remove(folder + report);  // of the last run
   const auto begin = Clock::now();
   Process process(container.command, log);
   {
