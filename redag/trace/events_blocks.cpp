@@ -184,7 +184,7 @@ class BlockSource final : public EventsSource {
   // Returns the bytes of the block at `offset` as the file has them.
   Result<std::string_view> read_checked(std::uint64_t offset) {
     block_ = offset;
-    const Result<std::string_view> head = file_.read(offset, kHeaderBytes);
+    Result<std::string_view> head = file_.read(offset, kHeaderBytes);
     if (!head) return head;
     if (head->size() < kHeaderBytes) return bad_block("the file ends within a block");
     std::memcpy(&header_, head->data(), kHeaderBytes);

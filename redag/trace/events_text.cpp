@@ -225,7 +225,7 @@ class TextSource final : public EventsSource {
       if (!seen_) return bad_line("the last line must have events, end_ns and lost_events");
     } else if (!read_event(line, event) || !has_valid_times(event)) {
       return bad_line("this line is not an event",
-                      "an event is written as [time,\"kind\",task,job,worker,value,\"reason\"]");
+                      R"(an event is written as [time,"kind",task,job,worker,value,"reason"])");
     } else if (event.task.value >= task_count_) {
       return bad_line("task " + std::to_string(event.task.value) + " is not in the workload");
     } else {
