@@ -19,7 +19,6 @@ namespace {
 using testing::between;
 using testing::make_workload;
 using testing::TestTask;
-using testing::tick_dag;
 
 constexpr int kInjections = 100;
 
@@ -34,7 +33,7 @@ struct Injection {
   std::uint32_t number = 0;  // of the victim's job
 };
 
-Dag dag_of(const char *name, std::vector<TestTask> tasks, std::uint32_t max_active = 0) {
+Dag dag_of(const char *name, const std::vector<TestTask> &tasks, std::uint32_t max_active = 0) {
   return testing::make_dag(name, tasks, max_active, kMicrosecond);
 }
 
