@@ -56,7 +56,7 @@ class Accelerator::Stream {
     result_.reset(clCreateBuffer(context, CL_MEM_WRITE_ONLY, sizeof(cl_uint), nullptr, &status));
     check(status, "clCreateBuffer");
     const cl_mem result = result_.get();
-    check(clSetKernelArg(kernel_.get(), 0, sizeof result, &result), "clSetKernelArg");
+    check(clSetKernelArg(kernel_.get(), 0, sizeof(cl_mem), &result), "clSetKernelArg");
   }
 
   void enqueue(Work work, cl_event *event) {
