@@ -225,7 +225,7 @@ TEST(Why, ManyPartsAreFewRows) {
   EXPECT_TRUE(rows_of({}, 3).empty());
 }
 
-RC_GTEST_PROP(Why, RowsHoldEachPartOnceAndInOrder, (std::vector<std::uint16_t> lengths, std::uint8_t spare)) {
+RC_GTEST_PROP(Why, RowsHoldEachPartOnceAndInOrder, (const std::vector<std::uint16_t> &lengths, std::uint8_t spare)) {
   const std::vector<Part> parts = parts_of_lengths(lengths);
   const std::size_t most = std::size_t{3} + spare;
   const std::vector<PartRow> rows = rows_of(parts, most);
@@ -311,7 +311,7 @@ TraceBuilder on_threads() {
   return builder;
 }
 
-trace::Trace threads_trace(TraceBuilder builder) {
+trace::Trace threads_trace(const TraceBuilder &builder) {
   trace::Trace trace = builder.until(90);
   trace.info.driver = trace::Driver::Threads;
   return trace;
