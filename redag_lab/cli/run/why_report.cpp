@@ -15,7 +15,6 @@
 namespace redag::cli {
 namespace {
 
-using metrics::Cause;
 using metrics::Culprit;
 using metrics::Explanation;
 using metrics::JobId;
