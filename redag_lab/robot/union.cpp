@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 #include <utility>
 
 #include "redag/model/validate.hpp"
@@ -140,13 +141,13 @@ class Union {
 
   // The bound for one of them assumes that it has a processor whenever the kernel lets it run.
   void add_reserved(const Threads &threads, std::size_t set) {
-    reserved_ += threads.count;
+    const std::size_t reserved = reserved_[set] += threads.count;
     const std::size_t cpus = robot_.cpu_sets[set].cpus.size();
-    if (reserved_ > cpus) {
+    if (reserved > cpus) {
       refuse(threads.place,
              fmt::format("{} threads have reservations, and there are {} processors: they can delay each other, which "
                          "no bound covers",
-                         reserved_, cpus),
+                         reserved, cpus),
              "give fewer threads a reservation");
       return;
     }
@@ -229,10 +230,10 @@ class Union {
   Workload workload_;
   Diagnostics mistakes_;
   std::vector<std::size_t> set_of_dag_;
-  std::vector<int> levels_;              // by TaskId of the union
-  std::vector<std::size_t> first_task_;  // by process: the first of its tasks in the union
-  std::size_t reserved_ = 0;             // threads with reservations
-  bool has_above_ = false;               // some task is above all levels of the order
+  std::vector<int> levels_;                      // by TaskId of the union
+  std::vector<std::size_t> first_task_;          // by process: the first of its tasks in the union
+  std::map<std::size_t, std::size_t> reserved_;  // by CPU set: threads with reservations
+  bool has_above_ = false;                       // some task is above all levels of the order
 };
 
 }  // namespace

@@ -327,9 +327,8 @@ std::vector<Container> selected(const Options &options) {
 }
 
 int compare(const Options &options, const std::vector<Container> &compared) {
-  char pattern[] = "/tmp/bench_image_pipeline.XXXXXX";
-  if (mkdtemp(pattern) == nullptr) throw std::runtime_error("cannot make a folder in /tmp");
-  const std::string folder = pattern;
+  std::string folder = (std::filesystem::temp_directory_path() / "bench_image_pipeline.XXXXXX").string();
+  if (mkdtemp(folder.data()) == nullptr) throw std::runtime_error("cannot make a folder such as " + folder);
   const std::string logs = options.logs.empty() ? folder : options.logs;
   std::filesystem::create_directories(logs);
   std::map<std::string, std::map<std::string, std::vector<double>>> results;  // by figure, then by container
