@@ -28,6 +28,7 @@ ADDRESS = {"vision": "10.91.0.1", "drive": "10.91.0.2"}
 SKEW = 3_700_000  # ns: the system's clock of drive is ahead of that of vision
 CLOCK_PORT, DATA_PORT = 7401, 7400
 TRANSPORT = 25_000_000  # ns at most
+ATTEMPTS = 4  # at a run in which no job was skipped and each datagram came in time: a busy machine may need several
 LINK = f"vision.camera.detect,drive.avoid.obstacles,{TRANSPORT}ns"
 
 
@@ -125,8 +126,8 @@ class TwoHosts(Case):
         self.assertEqual(client.returncode, 0, errors)
         return json.loads(text)
 
-    def record(self):
-        folders = {name: self.folder / name for name in self.hosts}
+    def record(self, folder):
+        folders = {name: folder / name for name in self.hosts}
         runs = {}
         for name in ("drive", "vision"):  # drive listens before vision sends
             runs[name] = self.start(name, EXAMPLE, name, ADDRESS["drive"], DATA_PORT, folders[name])
@@ -164,19 +165,29 @@ class TwoHosts(Case):
         """The values of events, which are times, by the number of their jobs."""
         return {event[3]: event[5] for event in self.lines(folder)[1:-1] if event[1] == kind and event[2] == task}
 
+    def skipped(self, folder):
+        return [event for event in self.lines(folder)[1:-1] if event[1] == "skipped"]
+
     def test_merged_times_and_latencies_are_within_what_is_stated(self):
         low, high = self.measure_offset()
-        folders = self.record()
-        shift = self.clock(folders["drive"]) - self.clock(folders["vision"])  # of drive's times, to those of vision
-        grabbed = self.times(folders["vision"], "released", 0)
-        detected = self.times(folders["vision"], "finished", 1)
-        seen = self.times(folders["drive"], "released", 0)
-        braked = self.times(folders["drive"], "finished", 1)
-        for number, time_seen in seen.items():  # the n-th job of each host is that of one image
-            self.assertGreater(time_seen + shift, detected[number], "a datagram came before it was sent: 'shift' is wrong")
-        slowest = max(time_seen + shift - detected[number] for number, time_seen in seen.items())
-        if slowest > TRANSPORT:  # which the link states
-            self.skipTest(f"a busy machine: a datagram took {slowest} ns from one program to the other")
+        for attempt in range(ATTEMPTS):
+            folders = self.record(self.folder / str(attempt))
+            shift = self.clock(folders["drive"]) - self.clock(folders["vision"])  # of drive's times, to those of vision
+            grabbed = self.times(folders["vision"], "released", 0)
+            detected = self.times(folders["vision"], "finished", 1)
+            seen = self.times(folders["drive"], "released", 0)
+            braked = self.times(folders["drive"], "finished", 1)
+            if any(self.skipped(folder) for folder in folders.values()):
+                obstacle = "a job was skipped"
+                continue
+            for number, time_seen in seen.items():  # without skipped jobs, the n-th job of each host is that of one image
+                self.assertGreater(time_seen + shift, detected[number], "a datagram came before it was sent: 'shift' is wrong")
+            slowest = max(time_seen + shift - detected[number] for number, time_seen in seen.items())
+            if slowest <= TRANSPORT:  # which the link states
+                break
+            obstacle = f"a datagram took {slowest} ns from one program to the other"
+        else:
+            self.skipTest(f"a busy machine: {obstacle}")
         self.skew(folders["drive"])
         document = self.merge(folders, f"{(low + high) // 2}ns+-{(high - low) // 2 + 1}ns")
 
