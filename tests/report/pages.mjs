@@ -42,9 +42,10 @@ export async function browserOf([executablePath, scratch]) {
   }
 
   async function test(name, body) {
+    const began = Date.now();
     try {
       await body();
-      console.log(`ok       ${name}`);
+      console.log(`ok       ${name}, ${Math.round((Date.now() - began) / 1000)} s`);
     } catch (error) {
       failures += 1;
       console.log(`FAILED   ${name}: ${error.message}`);
