@@ -316,6 +316,10 @@ class Engine {
   }
   void withdraw(Locked &locked) REDAG_REQUIRES(lock_);
   [[nodiscard]] bool is_quiet() const REDAG_REQUIRES(lock_) { return placement_.unfinished() == waiting_.size(); }
+  // Questions of wait_for(): with no answer yet, it asks again.
+  std::optional<bool> all_paused(Locked &locked) REDAG_REQUIRES(lock_);
+  std::optional<bool> all_quiet(Locked &locked) REDAG_REQUIRES(lock_);
+  bool wait_for(std::optional<bool> (Engine::*question)(Locked &), Time deadline) REDAG_EXCLUDES(lock_);
   void wake_pause_waiters() REDAG_REQUIRES(lock_);
   void end_of_jobs() REDAG_REQUIRES(lock_);
   /// Returns true if the throttling guard sees each decision.
