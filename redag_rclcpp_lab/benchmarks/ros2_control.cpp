@@ -66,14 +66,13 @@ constexpr const char *kHelp = R"(Compares executors for controller_manager's upd
   --logs FOLDER    keeps what the processes print and note
 
 Contenders: stock is ros2_control_node, with the planner in a process of its
-own. All others are one process with the update loop as a timer: on executors of
-rclcpp (ste, mte, events, and cbg where it was built), and on ReDAGExecutor
-(redag-none, redag-os). Prefix the command with `chrt -f 10` to give all threads
+own. All others are one process with the update loop as a timer: mte and cbg
+(where it was built) on executors of rclcpp, redag-none and redag-os on
+ReDAGExecutor. Prefix the command with `chrt -f 10` to give all threads
 of all processes a real-time priority; stock and redag-os set some of their own.
 
-With a single-threaded executor, controllers cannot be switched: the service
-waits for the update loop, which waits for the service. The update loop is then
-measured without active controllers.
+Single-threaded executors are left out. controller_manager's services wait for
+the update loop, which would wait for the service.
 
 The figures are medians over the runs. Exit status: 0 success; 1 a process did
 not run to its end; 2 invalid options.
@@ -233,10 +232,8 @@ Figures measure(const StackRun &run, const StackOptions &options, const Loads &l
 }
 
 std::vector<std::string> contenders() {
-  std::vector<std::string> all = {"stock", "ste", "mte"};
-  for (const char *peer : {"events", "cbg"}) {
-    if (redag_rclcpp::lab::check_peer(peer)) all.emplace_back(peer);
-  }
+  std::vector<std::string> all = {"stock", "mte"};
+  if (redag_rclcpp::lab::check_peer("cbg")) all.emplace_back("cbg");
   all.emplace_back("redag-none");
   if (redag::runtime::probe_priority_band().top_job > 0) all.emplace_back("redag-os");
   return all;

@@ -45,8 +45,7 @@ class Operator {
  public:
   explicit Operator(const std::string &robot_description);
 
-  /// Loads the three controllers, and activates them if they can be switched. Throws std::runtime_error if they cannot
-  /// be loaded.
+  /// Loads the three controllers and activates them. Throws std::runtime_error if that fails.
   void start();
 
   /// Calls services until `end` on CLOCK_MONOTONIC: lists controllers at 5 Hz, switches the gripper's at 1 Hz, loads
@@ -66,7 +65,6 @@ class Operator {
   TimedClient<controller_manager_msgs::srv::ConfigureController> configure_;
   TimedClient<controller_manager_msgs::srv::SwitchController> switch_;
   TimedClient<controller_manager_msgs::srv::UnloadController> unload_;
-  bool switches_ = false;
   int failed_ = 0;
 };
 
