@@ -53,7 +53,8 @@ HEADER_FOLDERS = {"fmt": "fmt", "nlohmann": "nlohmann-json-dev", "tl": "libexpec
 OPTIONAL = {"redag_rclcpp": {"cm_executors"},
             "redag_rclcpp_lab": {"autoware_reference_system", "cm_executors", "reference_interfaces", "reference_system",
                                  "image_proc", "ament_index_cpp", "composition_interfaces", "rclcpp_components",
-                                 "sensor_msgs"}}
+                                 "controller_interface", "controller_manager", "controller_manager_msgs",
+                                 "hardware_interface", "pluginlib", "sensor_msgs"}}
 # Folders of the repository that a package uses where they are there, and does without elsewhere.
 BESIDE = ("../benchmarks/counted", "../redag_testing")
 ROS_PACKAGES = ("redag_rclcpp", "redag_rclcpp_lab")
