@@ -10,6 +10,7 @@
 #include "redag/model/text_file.hpp"
 #include "redag/model/workload_yaml_node.hpp"
 #include "redag/runtime/setup.hpp"
+#include "redag_lab/robot/assigned_order.hpp"
 #include "redag_lab/robot/union.hpp"
 
 namespace redag::robot {
@@ -28,6 +29,15 @@ std::optional<Result<Input>> parse_robot(std::string_view text, const std::strin
   options.waits = false;  // a union has no devices
   Result<LoadedRobot> loaded = read_robot(*root, file, options);
   if (!loaded) return tl::unexpected<Diagnostics>(std::move(loaded.error()));
+  if (loaded->robot.by_bounds) {
+    Result<OrderSearch> search = search_order(loaded->robot);
+    if (!search) {
+      return Input{std::move(loaded->robot), std::move(loaded->warnings),
+                   tl::unexpected<Diagnostics>(std::move(search.error()))};
+    }
+    loaded->robot.assigned = std::move(search->order);
+    loaded->warnings.insert(loaded->warnings.end(), search->warnings.begin(), search->warnings.end());
+  }
   Result<LoadedWorkload> workload =
       union_of(loaded->robot, runtime::band_up_to(runtime::kHighestPriority).levels(), options);
   return Input{std::move(loaded->robot), std::move(loaded->warnings), std::move(workload)};

@@ -38,6 +38,24 @@ Result<Responses> responses_of(const Workload &workload, const analysis::Analysi
   return responses;
 }
 
+// Of a schedule that keeps all deadlines.
+Result<Responses> deadlines_of(const Workload &workload, const analysis::AnalysisPlatform &platform) {
+  Responses responses;
+  responses.tasks.resize(workload.task_count());
+  responses.dags.resize(workload.dags.size());
+  for (const ClusterPart &part : parts_of(workload)) {
+    if (part.workload.dags.empty()) continue;
+    const Result<analysis::TaskSet> task_set = analysis::compile(part.workload, analysis::platform_of(platform, part));
+    if (!task_set) return tl::unexpected<Diagnostics>(task_set.error());
+    for (const analysis::Unit &unit : task_set->units) {
+      const Duration due = std::min(unit.deadline, unit.limit);
+      for (const std::uint32_t t : unit.tasks) responses.tasks[part.tasks[t].value] = due;
+      if (task_set->dags[unit.dag.value].units.size() == 1) responses.dags[part.dags[unit.dag.value].value] = due;
+    }
+  }
+  return responses;
+}
+
 // A link in the union.
 struct Crossing {
   const Link &link;
@@ -66,8 +84,8 @@ class Iteration {
     }
   }
 
-  /// Raises each jitter to what the bounds ask for. Returns true if one changed.
-  Result<bool> step(const Responses &responses) {
+  /// Raises each jitter to what the bounds ask for. Returns true if one changed. `remedy`: for data that are too late.
+  Result<bool> step(const Responses &responses, const char *remedy) {
     bool changed = false;
     Diagnostics mistakes;
     for (const Crossing &crossing : crossings_) {
@@ -83,7 +101,7 @@ class Iteration {
             fmt::format("data of '{}' can arrive {} after the release behind them, which is more than their period {}",
                         crossing.link.from.name, humanize_duration(*response + crossing.link.transport),
                         format_duration(crossing.to.period)),
-            "lower the load, or the rate"));
+            remedy));
       } else if (const Duration jitter = *response + crossing.link.transport; jitter > crossing.to.jitter) {
         crossing.to.jitter = jitter;
         changed = true;
@@ -123,11 +141,24 @@ Result<void> set_jitter_of_links(const Robot &robot, const std::vector<std::size
   for (int round = 0; round < kMostRounds; ++round) {
     const Result<Responses> responses = responses_of(united, platform);
     if (!responses) return tl::unexpected<Diagnostics>(responses.error());
-    const Result<bool> changed = iteration.step(*responses);
+    const Result<bool> changed = iteration.step(*responses, "lower the load, or the rate");
     if (!changed) return tl::unexpected<Diagnostics>(changed.error());
     if (!*changed) return {};
   }
   return tl::unexpected<Diagnostics>(iteration.no_fixed_point());
+}
+
+Result<void> set_jitter_by_deadlines(const Robot &robot, const std::vector<std::size_t> &first_task,
+                                     const analysis::AnalysisPlatform &platform, Workload &united) {
+  if (robot.links.empty()) return {};
+  const Result<Responses> deadlines = deadlines_of(united, platform);
+  if (!deadlines) return tl::unexpected<Diagnostics>(deadlines.error());
+  const Result<bool> changed = Iteration(robot, first_task, united)
+                                   .step(*deadlines,
+                                         "policy audsley counts with the deadline of the sender: state one that is "
+                                         "shorter by the transport than the period");
+  if (!changed) return tl::unexpected<Diagnostics>(changed.error());
+  return {};
 }
 
 }  // namespace redag::robot

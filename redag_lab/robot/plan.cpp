@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "redag/runtime/threads.hpp"
-#include "redag/sched/policy.hpp"
 
 namespace redag::robot {
 namespace {
@@ -30,6 +29,9 @@ class Planner {
   Planner(const Robot &robot, runtime::PriorityBand band) : robot_(robot), band_(band) {}
 
   Result<Plan> run() {
+    if (robot_.by_bounds && !robot_.assigned) {
+      return make_error(fmt::format("no order of robot '{}' by its bounds is known", robot_.name));
+    }
     const auto has = [&](Level::Kind kind) {
       return std::any_of(robot_.threads.begin(), robot_.threads.end(),
                          [kind](const Threads &each) { return each.level && each.level->kind == kind; });
@@ -66,24 +68,15 @@ class Planner {
     const Process &process = robot_.processes[p];
     std::vector<int> &priorities = plan_.of_executor.emplace_back();
     if (!process.workload) return;
-    std::vector<sched::RankedTask> own;
-    std::vector<std::uint32_t> levels;  // by position in `own`
+    const std::vector<std::optional<std::uint32_t>> own = own_levels(robot_, p);
     for (const TaskRef &ref : flatten(*process.workload)) {
-      const Task &task = *ref.task;
       const std::uint32_t level = plan_.order.of_task[p][ref.id.value];
-      add_member(level, key_of(robot_.policy, task),
-                 fmt::format("{}.{}.{}", process.name, process.workload->dags[ref.dag.value].name, task.name));
-      if (is_of_threads(robot_, p, ref.id)) continue;
-      own.push_back(sched::RankedTask{.period = task.period,
-                                      .deadline = task.deadline,
-                                      .priority = task.priority.value_or(0),
-                                      .task = TaskId(own.size())});
-      levels.push_back(level);
-    }
-    const auto ranked = sched::assign_priorities(own, robot_.policy, Ties::Share);
-    for (std::size_t t = 0; t < ranked.size(); ++t) {
-      if (priorities.size() <= ranked[t].tier) priorities.resize(ranked[t].tier + 1);
-      priorities[ranked[t].tier] = band_.of_level(levels[t]);
+      add_member(level, key_of(robot_.policy, *ref.task),
+                 fmt::format("{}.{}.{}", process.name, process.workload->dags[ref.dag.value].name, ref.task->name));
+      const std::optional<std::uint32_t> &own_level = own[ref.id.value];
+      if (!own_level) continue;
+      if (priorities.size() <= *own_level) priorities.resize(*own_level + 1);
+      priorities[*own_level] = band_.of_level(level);
     }
   }
 

@@ -18,6 +18,9 @@
 
 namespace redag::robot {
 
+/// The policy of an order that the bounds decide (N. Audsley's assignment).
+inline constexpr const char *kAudsley = "audsley";
+
 /// Where an entry stands in its file, for messages about it.
 struct Place {
   std::string file;
@@ -123,16 +126,33 @@ struct Interrupts {
   Place place;
 };
 
+/// An order found by the bounds (assigned_order.hpp). Places count on each CPU set for itself, 0 is the most urgent.
+struct AssignedOrder {
+  std::vector<std::vector<std::uint32_t>> of_task = {};       // by process and TaskId
+  std::vector<std::optional<std::uint32_t>> of_threads = {};  // by entry; nothing: it has no rate
+  std::vector<std::string> tests = {};                        // that decided, each once
+  bool found = false;                                         // all units keep their deadlines under the tests
+};
+
 struct Robot {
   std::string name;
   PolicyKind policy = PolicyKind::RateMonotonic;
-  std::vector<std::string> hosts;  // their names; empty: one host, which needs none
-  std::vector<CpuSet> cpu_sets;    // at least one
+  bool by_bounds = false;                 // policy `audsley`: `assigned` is the order, and `policy` has no meaning
+  Place policy_place;                     // if by_bounds
+  std::optional<AssignedOrder> assigned;  // nothing: not yet known, or there is none
+  std::vector<std::string> hosts;         // their names; empty: one host, which needs none
+  std::vector<CpuSet> cpu_sets;           // at least one
   std::vector<Process> processes;
   std::vector<Link> links;
   std::vector<Threads> threads;
   std::vector<Interrupts> interrupts;
 };
+
+/// The policy as the file names it.
+[[nodiscard]] const char *policy_name(const Robot &robot);
+
+/// The policy by which the executor of a process orders its own tasks.
+[[nodiscard]] PolicyKind own_policy(const Robot &robot, std::size_t process);
 
 /// The host of a process, by position in Robot::hosts.
 [[nodiscard]] std::size_t host_of(const Robot &robot, std::size_t process);

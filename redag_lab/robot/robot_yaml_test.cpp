@@ -187,8 +187,9 @@ TEST(RobotYaml, SaysWhereAndHowToMend) {
             "cart.yaml:4:5: error: process 'a' has no match (add 'match: {name: PROGRAM}' or 'match: {command: "
             "\"*/PROGRAM *\"}')\n"
             "cart.yaml:4:15: error: unknown key 'mach' in a process (did you mean 'match'?)");
-  EXPECT_EQ(findings("robot: cart\npolicy: edf\ncpus: 0\nprocesses:\n  - {name: a, match: {name: a}}\n"),
-            "cart.yaml:2:9: error: policy must be one of rate_monotonic, deadline_monotonic, fixed, not 'edf'");
+  EXPECT_EQ(
+      findings("robot: cart\npolicy: edf\ncpus: 0\nprocesses:\n  - {name: a, match: {name: a}}\n"),
+      "cart.yaml:2:9: error: policy must be one of rate_monotonic, deadline_monotonic, fixed, audsley, not 'edf'");
 }
 
 TEST(RobotYaml, RefusesCpuSetsThatShareProcessors) {
@@ -325,7 +326,8 @@ TEST(RobotYaml, ReportsMistakesOfFilesInThem) {
 }
 
 TEST(RobotYaml, TheShippedExamplesAreSound) {
-  for (const auto &[name, tasks] : {std::pair{"cart.yaml", 7u}, std::pair{"brake.yaml", 5u}}) {
+  for (const auto &[name, tasks] :
+       {std::pair{"cart.yaml", 7u}, std::pair{"brake.yaml", 5u}, std::pair{"arm.yaml", 4u}}) {
     const Result<Input> input = load_input((testing::repository() / "examples" / "robot" / name).string());
     ASSERT_TRUE(input) << to_string(input.error());
     EXPECT_TRUE(input->warnings.empty()) << to_string(input->warnings);

@@ -15,6 +15,8 @@
 
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
+#include "redag_lab/robot/assigned_order.hpp"
+#include "redag_lab/robot/order.hpp"
 #include "redag_lab/robot/plan.hpp"
 #include "redag_lab/robot/union.hpp"
 #include "redag_testing/bound_property.hpp"
@@ -312,6 +314,31 @@ TEST(RobotUnionBounds, HoldForSchedulersAboveOneKernel) {
   }
   EXPECT_GT(bounded, count / 2);
   EXPECT_GT(jobs, count * 50);
+}
+
+// An order in which rates of one process can come before shorter ones of another.
+TEST(RobotUnionBounds, HoldInAnOrderByTheBounds) {
+  std::uint64_t robots = 0;
+  std::uint64_t inverted = 0;
+  const std::uint64_t count = testing::how_many(200);
+  for (std::uint64_t seed = 1; seed <= count; ++seed) {
+    Rng rng(seed);
+    Robot robot = random_robot(rng, testing::chance(rng, 0.3) ? std::vector{0} : std::vector{0, 1});
+    const std::vector<std::vector<std::uint32_t>> by_rate = order_of(robot, 0).of_task;
+    robot.by_bounds = true;
+    Result<OrderSearch> search = search_order(robot);
+    if (!search) continue;  // groups on two processors
+    robot.assigned = std::move(search->order);
+    ++robots;
+    inverted += order_of(robot, 0).of_task != by_rate ? 1U : 0U;
+    const auto [plan, report] = analysed(robot, testing::chance(rng, 0.8) ? 90 : 5);
+    for (std::uint64_t run = 0; run < 3; ++run) {
+      const Observed observed = observe(robot, plan, report, robot.cpu_sets[0].cpus.size(), seed * 1000 + run);
+      ASSERT_EQ(observed.violation, "") << "seed " << seed << ", run " << run;
+    }
+  }
+  EXPECT_GT(robots, count / 3);
+  EXPECT_GT(inverted, robots / 10);
 }
 
 // Data that cross to another process, and its bounds from the release behind them on.

@@ -33,7 +33,8 @@ class Union {
     workload_.platform.preemption = PreemptionMode::Os;
   }
 
-  Result<LoadedWorkload> run(LoadOptions options) {
+  Result<United> run(LoadOptions options) {
+    first_of_threads_.resize(robot_.threads.size());
     for (std::size_t p = 0; p < robot_.processes.size(); ++p) add_process(p);
     for (std::size_t t = 0; t < robot_.threads.size(); ++t) add_threads(t);
     if (mistakes_.empty() && workload_.dags.empty()) {
@@ -42,12 +43,13 @@ class Union {
     }
     if (!mistakes_.empty()) return tl::unexpected<Diagnostics>(std::move(mistakes_));
     set_platform();
-    if (order_.is_merged() || has_above_) fix_priorities();
+    if (order_.is_merged() || has_above_ || robot_.by_bounds) fix_priorities();
     Diagnostics found = validate(workload_, options);
     if (has_errors(found)) return tl::unexpected<Diagnostics>(std::move(found));
-    const Result<void> linked = set_jitter_of_links(robot_, first_task_, analysis::platform_of(workload_), workload_);
-    if (!linked) return tl::unexpected<Diagnostics>(linked.error());
-    return LoadedWorkload{std::move(workload_), std::move(found), true};
+    std::vector<bool> is_above;
+    for (const int level : levels_) is_above.push_back(level < 0);
+    return United{std::move(workload_), std::move(found), std::move(first_task_), std::move(first_of_threads_),
+                  std::move(is_above)};
   }
 
  private:
@@ -86,7 +88,9 @@ class Union {
       return;
     }
     if (!has_executor(robot_, p)) return;
-    if (workload.policy != robot_.policy) {
+    if (robot_.by_bounds) {
+      check_own_order(process);
+    } else if (workload.policy != robot_.policy) {
       refuse(process.place,
              fmt::format("process '{}' orders its jobs by {}, and the robot by {}", process.name,
                          to_string(workload.policy), to_string(robot_.policy)),
@@ -112,6 +116,19 @@ class Union {
     }
   }
 
+  // In an order by the bounds, a process keeps its own order of its own levels.
+  void check_own_order(const Process &process) {
+    const PolicyKind policy = process.workload->policy;
+    if (policy == PolicyKind::RateMonotonic || policy == PolicyKind::DeadlineMonotonic || policy == PolicyKind::Fixed) {
+      return;
+    }
+    refuse(process.place,
+           fmt::format("process '{}' orders its jobs by {}, which has no levels that could have a place among those of "
+                       "other processes",
+                       process.name, to_string(policy)),
+           "write 'policy: rate_monotonic', deadline_monotonic or fixed in its workload");
+  }
+
   void add_threads(std::size_t t) {
     const Threads &threads = robot_.threads[t];
     if (!threads.level) return;
@@ -127,7 +144,7 @@ class Union {
     if (!threads.level->interferes()) return;
     const std::optional<std::size_t> set = set_of(threads);
     if (!set) return;
-    if (threads.level->kind == Level::Kind::Reservation) return add_reserved(threads, *set);
+    if (threads.level->kind == Level::Kind::Reservation) return add_reserved(t, *set);
     if (threads.wcet == 0) {
       refuse(threads.place, fmt::format("threads '{}' can delay tasks, and nothing says for how long", threads.name),
              "add 'wcet:' and 'period:': what one of them executes at most, and how often; or use a level below");
@@ -136,11 +153,12 @@ class Union {
     Task task;
     task.wcet = threads.wcet;
     task.period = task.deadline = threads.period;
-    add_interference(threads, *set, task, order_.of_threads[t] ? static_cast<int>(*order_.of_threads[t]) : kAbove);
+    add_interference(t, *set, task, order_.of_threads[t] ? static_cast<int>(*order_.of_threads[t]) : kAbove);
   }
 
   // The bound for one of them assumes that it has a processor whenever the kernel lets it run.
-  void add_reserved(const Threads &threads, std::size_t set) {
+  void add_reserved(std::size_t t, std::size_t set) {
+    const Threads &threads = robot_.threads[t];
     const std::size_t reserved = reserved_[set] += threads.count;
     const std::size_t cpus = robot_.cpu_sets[set].cpus.size();
     if (reserved > cpus) {
@@ -156,11 +174,13 @@ class Union {
     task.wcet = load.wcet;
     task.period = task.deadline = load.period;
     task.jitter = load.jitter;
-    add_interference(threads, set, task, kReserved);
+    add_interference(t, set, task, kReserved);
   }
 
   // Adds a DAG with `count` such tasks.
-  void add_interference(const Threads &threads, std::size_t set, Task task, int level) {
+  void add_interference(std::size_t t, std::size_t set, Task task, int level) {
+    const Threads &threads = robot_.threads[t];
+    first_of_threads_[t] = levels_.size();
     Dag &dag = workload_.dags.emplace_back();
     dag.name = joined(kThreads, threads.name);
     for (std::uint32_t i = 0; i < threads.count; ++i) {
@@ -230,16 +250,26 @@ class Union {
   Workload workload_;
   Diagnostics mistakes_;
   std::vector<std::size_t> set_of_dag_;
-  std::vector<int> levels_;                      // by TaskId of the union
-  std::vector<std::size_t> first_task_;          // by process: the first of its tasks in the union
+  std::vector<int> levels_;              // by TaskId of the union
+  std::vector<std::size_t> first_task_;  // by process: the first of its tasks in the union
+  std::vector<std::optional<std::size_t>> first_of_threads_;
   std::map<std::size_t, std::size_t> reserved_;  // by CPU set: threads with reservations
   bool has_above_ = false;                       // some task is above all levels of the order
 };
 
 }  // namespace
 
-Result<LoadedWorkload> union_of(const Robot &robot, std::uint32_t levels, LoadOptions options) {
+Result<United> unite(const Robot &robot, std::uint32_t levels, LoadOptions options) {
   return Union(robot, levels).run(options);
+}
+
+Result<LoadedWorkload> union_of(const Robot &robot, std::uint32_t levels, LoadOptions options) {
+  Result<United> united = unite(robot, levels, options);
+  if (!united) return tl::unexpected<Diagnostics>(std::move(united.error()));
+  Workload &workload = united->workload;
+  const Result<void> linked = set_jitter_of_links(robot, united->first_task, analysis::platform_of(workload), workload);
+  if (!linked) return tl::unexpected<Diagnostics>(linked.error());
+  return LoadedWorkload{std::move(workload), std::move(united->warnings), true};
 }
 
 }  // namespace redag::robot

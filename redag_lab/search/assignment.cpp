@@ -92,9 +92,10 @@ class Search {
       const auto late = static_cast<double>(response - due);
       return objective == Objective::Lateness ? late : late / static_cast<double>(due);
     };
-    const auto found = audsley(workload_, platform_, *choice.test, badness, [this] { return stopped(); });
+    const auto found =
+        audsley(workload_, platform_, *choice.test, all_orders(task_set), badness, [this] { return stopped(); });
     if (!found) return;
-    result_.audsley_found = found->found;
+    result_.audsley_found = !found->failure;
     add_order("audsley", with_order(workload_, task_set, found->order));
   }
 

@@ -29,23 +29,26 @@ namespace fs = std::filesystem;
 // libfastdds is Fast DDS 3.
 constexpr std::array<std::string_view, 4> kLibraries{"libddsc.so", "libfastrtps.so", "libfastdds.so", "libzenohc.so"};
 
-// Threads of these libraries that neither receive nor deliver: they free memory, or write logs. A name that ends with a
-// dot is followed by more. Cyclone DDS: q_gc.c, q_debmon.c, dds_init.c. Fast DDS: Log.cpp, SharedMemLog.hpp,
-// SharedMemWatchdog.hpp, TypeLookupRequestListener.cpp.
-constexpr std::array<std::string_view, 7> kBackground{"gc",        "debmon",       "threadmon", "dds.log",
-                                                      "dds.shmd.", "dds.shm.wdog", "dds.tls."};
+// Threads of these libraries that neither receive nor deliver: they free memory, write logs, or look after files. A
+// name that ends with a dot is followed by more. Cyclone DDS: q_gc.c, q_debmon.c, dds_init.c. Fast DDS: Log.cpp,
+// LogTopic.cpp, SharedMemLog.hpp, SharedMemWatchdog.hpp, TypeLookupRequestListener.cpp, FileWatch.hpp.
+constexpr std::array<std::string_view, 10> kBackground{"gc",         "debmon",       "threadmon",    "dds.log",
+                                                       "dds.slog.",  "dds.shmd.",    "dds.shm.wdog", "dds.tls.",
+                                                       "dds.fwatch", "dds.fwatch.cb"};
 
 // Names in Cyclone DDS: q_init.c, q_radmin.c, q_xevent.c. dq.* deliver what recv* received; tev sends acknowledgements.
 constexpr std::array<std::string_view, 6> kCyclone{"recv", "recvMC", "recvUC", "dq.builtins", "dq.user", "tev"};
 // Names in Fast DDS: UDPChannelResource.cpp, TCPTransportInterface.cpp, SharedMemChannelResource.hpp,
-// RTPSParticipantImpl.cpp, FlowControllerImpl.hpp. Numbers follow, separated by dots.
-constexpr std::array<std::string_view, 5> kFastNumbered{"dds.udp.", "dds.tcp.", "dds.shm.", "dds.ev.", "dds.asyn."};
-constexpr std::string_view kFastAccepts = "dds.tcp_accept";
+// DataSharingListener.cpp, RTPSParticipantImpl.cpp, PDPServer.cpp, FlowControllerImpl.hpp. Numbers follow, separated by
+// dots.
+constexpr std::array<std::string_view, 7> kFastNumbered{"dds.udp.", "dds.tcp.",   "dds.shm.", "dds.dsha.",
+                                                        "dds.ev.",  "dds.ds_ev.", "dds.asyn."};
+constexpr std::array<std::string_view, 2> kFastWhole{"dds.tcp_accept", "dds.tcp_keep"};
 
 bool is_cyclone(std::string_view name) { return std::find(kCyclone.begin(), kCyclone.end(), name) != kCyclone.end(); }
 
 bool is_fast(std::string_view name) {
-  if (name == kFastAccepts) return true;
+  if (std::find(kFastWhole.begin(), kFastWhole.end(), name) != kFastWhole.end()) return true;
   return std::any_of(kFastNumbered.begin(), kFastNumbered.end(), [&](std::string_view prefix) {
     const bool begins = name.size() > prefix.size() && name.substr(0, prefix.size()) == prefix;
     return begins && name.find_first_not_of("0123456789.", prefix.size()) == std::string_view::npos;

@@ -133,9 +133,16 @@ class ContainerTest : public ::testing::Test {
   typename Service::Response::SharedPtr call(const std::string &name, const typename Service::Request &request) {
     const auto client = node_->create_client<Service>(name);
     if (!client->wait_for_service(kLimit)) return nullptr;
-    auto future = client->async_send_request(std::make_shared<typename Service::Request>(request));
-    if (spinning_->spin_until_future_complete(future, kLimit) != rclcpp::FutureReturnCode::SUCCESS) return nullptr;
-    return future.get();
+    // The request is repeated, because Fast DDS can lose the response to a client that the service has discovered in
+    // part (github.com/ros2/rmw_fastrtps/issues/842).
+    constexpr auto kPatience = 10s;
+    for (const auto end = steady_clock::now() + kLimit; steady_clock::now() < end;) {
+      auto future = client->async_send_request(std::make_shared<typename Service::Request>(request));
+      if (spinning_->spin_until_future_complete(future, kPatience) == rclcpp::FutureReturnCode::SUCCESS) {
+        return future.get();
+      }
+    }
+    return nullptr;
   }
 
   LoadNode::Response::SharedPtr load(const std::string &plugin, const std::vector<rclcpp::Parameter> &parameters) {

@@ -103,12 +103,14 @@ std::vector<int> ids_of(const MiddlewareThreads &found) {
 // ---- recognition ----
 
 TEST(MiddlewareThreads, AreKnownByTheirWholeNames) {
-  for (const char *name : {"recv", "recvMC", "recvUC", "dq.builtins", "dq.user", "tev", "dds.udp.7411", "dds.shm.7410",
-                           "dds.ev.12", "dds.asyn.1.1", "dds.tcp_accept"}) {
+  for (const char *name :
+       {"recv", "recvMC", "recvUC", "dq.builtins", "dq.user", "tev", "dds.udp.7411", "dds.shm.7410", "dds.dsha.260",
+        "dds.ev.12", "dds.ds_ev.0", "dds.asyn.1.1", "dds.tcp_accept", "dds.tcp_keep"}) {
     EXPECT_TRUE(is_middleware_thread_name(name)) << name;
   }
-  for (const char *name : {"recv_camera", "recvLidar", "receiver", "dq.", "dq.control", "tevent", "tev.mine", "dds.",
-                           "dds.logger", "dds.udp.", "dds.shm.wdog", "dds.udp.lidar", "redag-timer", ""}) {
+  for (const char *name :
+       {"recv_camera", "recvLidar", "receiver", "dq.", "dq.control", "tevent", "tev.mine", "dds.", "dds.logger",
+        "dds.udp.", "dds.shm.wdog", "dds.slog.0", "dds.fwatch", "dds.udp.lidar", "redag-timer", ""}) {
     EXPECT_FALSE(is_middleware_thread_name(name)) << name;
   }
 }
@@ -217,11 +219,15 @@ TEST_F(RaisedThreads, ThatAppearLateAreFoundByTheNextLook) {
 }
 
 TEST_F(RaisedThreads, InTheBackgroundKeepTheirPriority) {
-  const NamedThread background("gc");
+  std::vector<std::unique_ptr<NamedThread>> background;
+  for (const char *name : {"gc", "debmon", "threadmon", "dds.log", "dds.slog.0", "dds.shmd.1", "dds.shm.wdog",
+                           "dds.tls.replies", "dds.fwatch", "dds.fwatch.cb"}) {
+    background.push_back(std::make_unique<NamedThread>(name));
+  }
   const NamedThread delivers("tev");
   const RaisedMiddleware raised(90);
   EXPECT_EQ(delivers.priority(), 90);
-  EXPECT_EQ(background.policy(), SCHED_OTHER);
+  for (const auto &thread : background) EXPECT_EQ(thread->policy(), SCHED_OTHER);
 }
 
 TEST_F(RaisedThreads, AreOnlyLookedAtWithoutAPriority) {

@@ -5,7 +5,6 @@
 // peers.
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -43,12 +42,6 @@ inline std::vector<Contender> contenders(std::uint32_t workers = 2) {
     all.push_back({"redag-os", [=] { return make_redag(redag::PreemptionMode::Os, workers); }});
   }
   return all;
-}
-
-/// The median; 0 without values.
-inline double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  return values.empty() ? 0 : values[values.size() / 2];
 }
 
 }  // namespace redag_rclcpp::lab

@@ -30,6 +30,7 @@
 #include "phased_timer.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "ring.hpp"
+#include "samples.hpp"
 #include "std_msgs/msg/u_int64.hpp"
 
 namespace {

@@ -4,7 +4,6 @@
 // The components around image_proc's for bench_image_pipeline: a synthetic camera, a viewer that measures how old its
 // frames are, and a control loop that measures how late it is called. The viewer and the control loop write their
 // figures as JSON to the file `report` when they are destroyed. They leave out the first `warm_up` seconds.
-#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
@@ -18,9 +17,11 @@
 #include "rclcpp/rclcpp.hpp"
 #include "rclcpp_components/register_node_macro.hpp"
 #include "redag/runtime/clock.hpp"
+#include "samples.hpp"
 #include "sensor_msgs/image_encodings.hpp"
 #include "sensor_msgs/msg/camera_info.hpp"
 #include "sensor_msgs/msg/image.hpp"
+#include "timer_grid.hpp"
 
 namespace redag_rclcpp::lab {
 
@@ -36,59 +37,11 @@ Duration read_seconds(rclcpp::Node &node, const char *name, double initial) {
   return std::llround(node.declare_parameter<double>(name, initial) * static_cast<double>(redag::kSecond));
 }
 
-/// One call of a timer, compared with the timer's grid.
-struct Call {
-  Time nominal = 0;          // the point of the grid that the call is for
-  Duration lateness = 0;     // since the first point that no call was for
-  std::int64_t skipped = 0;  // points before `nominal` that no call was for
-};
-
-/// Compares a timer's calls with its grid. rclcpp drops the points that have passed when it calls a timer late.
-class Grid {
- public:
-  explicit Grid(Duration period) : period_(period) {}
-
-  /// To be called at the start of the timer's callback.
-  Call next(rclcpp::TimerBase &timer) {
-    const Time now = monotonic_now();
-    Call call;
-    call.nominal = now + timer.time_until_trigger().count() - period_;
-    call.lateness = now - call.nominal;
-    if (last_) {
-      call.skipped = std::max<std::int64_t>(
-          0, std::llround(static_cast<double>(call.nominal - *last_) / static_cast<double>(period_)) - 1);
-      call.lateness += call.skipped * period_;
-    }
-    last_ = call.nominal;
-    return call;
-  }
-
- private:
-  Duration period_;
-  std::optional<Time> last_;
-};
-
-/// Durations in the order in which they were measured.
-class Samples {
- public:
-  void add(Duration value) { values_.push_back(value); }
-  [[nodiscard]] std::size_t size() const { return values_.size(); }
-
-  /// In milliseconds; empty without samples.
-  [[nodiscard]] nlohmann::json summary() const {
-    if (values_.empty()) return nlohmann::json::object();
-    std::vector<Duration> sorted = values_;
-    std::sort(sorted.begin(), sorted.end());
-    const auto at = [&](double rank) {
-      const auto last = static_cast<double>(sorted.size() - 1);
-      return static_cast<double>(sorted[static_cast<std::size_t>(rank * last)]) / redag::kMillisecond;
-    };
-    return {{"p50", at(0.5)}, {"p99", at(0.99)}, {"max", at(1)}};
-  }
-
- private:
-  std::vector<Duration> values_;
-};
+/// In milliseconds; empty without samples.
+nlohmann::json summary(const Samples &samples) {
+  if (samples.size() == 0) return nlohmann::json::object();
+  return {{"p50", samples.milliseconds(0.5)}, {"p99", samples.milliseconds(0.99)}, {"max", samples.milliseconds(1)}};
+}
 
 void write_report(const rclcpp::Node &node, const std::string &file, const nlohmann::json &figures) {
   std::ofstream out(file);
@@ -131,7 +84,7 @@ class Camera : public rclcpp::Node {
 
  private:
   void capture() {
-    const Call call = grid_.next(*timer_);
+    const TimerCall call = grid_.next(*timer_);
     image_.header.stamp = now() - rclcpp::Duration(std::chrono::nanoseconds(monotonic_now() - call.nominal));
     info_.header.stamp = image_.header.stamp;
     images_->publish(image_);
@@ -139,7 +92,7 @@ class Camera : public rclcpp::Node {
   }
 
   Duration period_;
-  Grid grid_;
+  TimerGrid grid_;
   Image image_;
   CameraInfo info_;
   rclcpp::Publisher<Image>::SharedPtr images_;
@@ -170,7 +123,7 @@ class Viewer : public rclcpp::Node {
     write_report(*this, report_,
                  {{"frames", latencies_.size()},
                   {"lost", expected - static_cast<std::int64_t>(latencies_.size())},
-                  {"latency", latencies_.summary()}});
+                  {"latency", summary(latencies_)}});
   }
 
  private:
@@ -212,16 +165,14 @@ class Control : public rclcpp::Node {
 
   ~Control() override {
     if (report_.empty()) return;
-    write_report(*this, report_, {{"points", points_}, {"missed", missed_}, {"lateness", latenesses_.summary()}});
+    write_report(*this, report_, {{"points", points_}, {"missed", missed_}, {"lateness", summary(latenesses_)}});
   }
 
  private:
   void control() {
-    const Call call = grid_.next(*timer_);
+    const TimerCall call = grid_.next(*timer_);
     const Time start = monotonic_now();
-    const Time used = redag::runtime::thread_cpu_now();
-    while (redag::runtime::thread_cpu_now() - used < load_) {
-    }
+    use_processor(load_);
     if (!begin_) begin_ = start + warm_up_;
     if (start < *begin_) return;
     points_ += call.skipped + 1;
@@ -233,7 +184,7 @@ class Control : public rclcpp::Node {
   Duration load_;
   Duration warm_up_;
   std::string report_;
-  Grid grid_;
+  TimerGrid grid_;
   std::optional<Time> begin_;
   std::int64_t points_ = 0;
   std::int64_t missed_ = 0;

@@ -28,6 +28,7 @@
 #include "contenders.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "reference_system/system/type/rclcpp_system.hpp"
+#include "samples.hpp"
 
 namespace {
 

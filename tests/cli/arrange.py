@@ -94,6 +94,56 @@ class Robots(Case):
             self.assertLess(time.monotonic(), end, what)
             time.sleep(0.02)
 
+    # --- an order by the bounds ---
+
+    def test_the_bounds_put_the_detector_first(self):
+        arm = SOURCE / "examples" / "robot" / "arm.yaml"
+        result = self.expect(redag("arrange", arm, "--rtprio", "90", "--json"), 0)
+        plan = json.loads(result.stdout)
+        self.assertEqual(plan["policy"], "audsley")
+        self.assertEqual(plan["search"], {"tests": ["guan with deadlines for responses"], "found": True})
+        self.assertEqual([row["members"] for row in plan["levels"]],
+                         [["vision.detector.detect"], ["right.joints.control"], ["left.joints.control"], ["left.log.state"]])
+        self.assertEqual(plan["executors"]["left"], [78, 77])
+        self.expect(redag("analyze", arm, "--check"), 0)
+        by_rate = self.write("arm.yaml", arm.read_text().replace("policy: audsley", "policy: rate_monotonic"))
+        self.expect(redag("analyze", by_rate, "--check"), 1)
+        text = self.expect(redag("arrange", arm, "--rtprio", "90"), 0).stdout
+        self.assertIn("arm: one order by audsley (guan with deadlines for responses), SCHED_FIFO 80 to 77", text)
+        self.assertEqual(self.expect(redag("arrange", arm, "--rtprio", "90", "--levels", "left"), 0).stdout, "78,77\n")
+
+    def test_says_which_unit_has_no_place(self):
+        arm = self.write("arm.yaml", (SOURCE / "examples" / "robot" / "arm.yaml").read_text().replace("29ms", "32500us"))
+        for command in (["validate"], ["arrange", "--rtprio", "90"]):
+            self.expect(redag(command[0], arm, *command[1:]), 0, "warning: no order keeps all deadlines by guan")
+        broken = self.write("broken.yaml", arm.read_text().replace("wcet: 5ms, ", ""))
+        self.expect(redag("arrange", broken, "--rtprio", "90"), 2, "broken.yaml:")
+
+    # --- from callback_isolated_executor ---
+
+    def test_an_import_is_filled_in_and_valid(self):
+        example = SOURCE / "examples" / "import" / "callback_groups.yaml"
+        robot = self.folder / "robot.yaml"
+        self.expect(redag("import", example, "-o", robot), 0, "to be filled in: 11 values, each written as TODO")
+        self.assertEqual(self.expect(redag("import", "-", text=example.read_text()), 0).stdout.count("TODO"), 12)
+        gaps = self.expect(redag("validate", robot), 2).stderr
+        self.assertEqual(len([line for line in gaps.splitlines() if "error: " in line and "'TODO'" in line]), 11, gaps)
+        text = robot.read_text()
+        for key, value in (("match", "{name: n}"), ("wcet", "1ms"), ("period", "100ms")):
+            text = text.replace(f"{key}: TODO", f"{key}: {value}")
+        robot.write_text(text)
+        self.expect(redag("validate", robot), 0)
+        levels = json.loads(self.expect(redag("arrange", robot, "--rtprio", "90", "--json"), 0).stdout)["levels"]
+        self.assertEqual([level["members"][0] for level in levels],
+                         ["wheels.wheels.timer_5ms", "lidar.lidar.subscription_scan", "logger.logger.timer_1s"])
+
+    def test_refuses_what_is_no_configuration(self):
+        self.expect(redag("import", EXAMPLE), 2, "cart.yaml:4:1: error: unknown key 'robot'")
+        self.expect(redag("import", self.folder / "none.yaml"), 2, "No such file")
+        wrong = self.write("groups.yaml", "callback_groups:\n  - {id: /a@Timer(5), policy: SCHED_FIFO, priority: high}\n")
+        self.expect(redag("import", wrong), 2, "groups.yaml:2:")
+        self.expect(redag("import", wrong, "-o", "/no/such/folder/x.yaml"), 2, "/no/such/folder/x.yaml")
+
     # --- a robot as one workload ---
 
     def test_a_robot_is_the_workload_written_by_hand(self):

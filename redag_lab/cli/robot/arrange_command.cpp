@@ -59,6 +59,10 @@ std::optional<robot::Robot> load_robot(const std::string &file, Console &console
                   "a robot file begins with 'robot: NAME' and lists 'processes:', see docs/robot.md");
     return std::nullopt;
   }
+  if (input->robot->by_bounds && !input->robot->assigned) {
+    console.note(input->workload.error());
+    return std::nullopt;
+  }
   return std::move(input->robot);
 }
 

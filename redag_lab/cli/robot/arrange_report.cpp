@@ -25,6 +25,12 @@ std::string key_text(PolicyKind policy, std::int64_t key) {
   return policy == PolicyKind::Fixed ? std::to_string(key) : format_duration(key);
 }
 
+// By the bounds: with the tests that decided.
+std::string order_name(const robot::Robot &robot) {
+  if (!robot.assigned) return policy_name(robot);
+  return fmt::format("{} ({})", policy_name(robot), fmt::join(robot.assigned->tests, "; "));
+}
+
 std::string state_text(const robot::ThreadState &state, const robot::ThreadState &other) {
   std::string text = to_string(state.scheduling);
   if (state.cpus != other.cpus) text += " on " + format_cpu_list(state.cpus);
@@ -40,15 +46,14 @@ Json state_json(const robot::ThreadState &state) {
 std::string describe(const robot::Robot &robot, const robot::Plan &plan, const StreamTraits &terminal) {
   const robot::Order &order = plan.order;
   std::string text =
-      fmt::format("{}: one order by {}", tinted(robot.name, Tint::Strong, terminal.colour), to_string(robot.policy));
+      fmt::format("{}: one order by {}", tinted(robot.name, Tint::Strong, terminal.colour), order_name(robot));
   if (plan.levels.empty()) return text + ", without tasks\n";
   text += fmt::format(", SCHED_FIFO {} to {}; timers of executors at {}\n", plan.levels.front().priority,
                       plan.levels.back().priority, plan.band.timer);
   if (order.is_merged()) {
     text += fmt::format(
-        "{} of {} rates share a level with others, because there are {} levels: they do not preempt "
-        "each other\n",
-        order.ranks - order.levels + 1, order.ranks, order.levels);
+        "{} of {} {} share a level with others, because there are {} levels: they do not preempt each other\n",
+        order.ranks - order.levels + 1, order.ranks, robot.by_bounds ? "places" : "rates", order.levels);
   }
   Table table({{.title = "priority", .number = true, .importance = 3},
                {.title = key_name(robot.policy), .number = true, .importance = 2},
@@ -99,12 +104,13 @@ std::string describe(const robot::Changes &changes, const StreamTraits &terminal
 
 Json to_json(const robot::Robot &robot, const robot::Plan &plan, const robot::Changes &changes) {
   const bool fixed = robot.policy == PolicyKind::Fixed;
-  Json document = {{"format", "redag.arrange/1"},       {"robot", robot.name},
-                   {"policy", to_string(robot.policy)}, {"timer_priority", plan.band.timer},
-                   {"merged", plan.order.is_merged()},  {"levels", Json::array()},
-                   {"executors", Json::object()},       {"threads", Json::array()},
-                   {"interrupts", Json::array()},       {"matched_threads", changes.matched},
+  Json document = {{"format", "redag.arrange/1"},      {"robot", robot.name},
+                   {"policy", policy_name(robot)},     {"timer_priority", plan.band.timer},
+                   {"merged", plan.order.is_merged()}, {"levels", Json::array()},
+                   {"executors", Json::object()},      {"threads", Json::array()},
+                   {"interrupts", Json::array()},      {"matched_threads", changes.matched},
                    {"remarks", changes.remarks}};
+  if (robot.assigned) document["search"] = Json{{"tests", robot.assigned->tests}, {"found", robot.assigned->found}};
   for (const robot::PlannedLevel &level : plan.levels) {
     document["levels"].push_back(Json{{"priority", level.priority},
                                       {fixed ? "first" : "first_ns", level.first},

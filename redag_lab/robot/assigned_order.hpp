@@ -1,0 +1,23 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// Audsley's assignment for a robot (policy `audsley`): the bounds of the union decide which level of which process
+// comes before which. Each process keeps the order of its own levels, because its executor can follow no other with
+// REDAG_LEVELS. Rationale: docs/decisions/0044. Pure.
+#pragma once
+
+#include "redag/base/result.hpp"
+#include "redag_lab/robot/robot.hpp"
+
+namespace redag::robot {
+
+struct OrderSearch {
+  AssignedOrder order;
+  Diagnostics warnings;  // where no order keeps all deadlines: which unit has no place, at its process
+};
+
+/// Searches an order of `robot`, each CPU set for itself. Errors: what union_of() refuses; no bound of the union is a
+/// test that Audsley's assignment can use; an entry of threads has a rate where no task runs.
+[[nodiscard]] Result<OrderSearch> search_order(const Robot &robot);
+
+}  // namespace redag::robot
