@@ -4,10 +4,12 @@
 #include "command_line.hpp"
 
 #include <algorithm>
+#include <csignal>
 #include <cstdio>
-#include <vector>
+#include <utility>
 
 #include "rclcpp/rclcpp.hpp"
+#include "redag/base/check.hpp"
 #include "redag/base/text.hpp"
 
 namespace redag_rclcpp::lab {
@@ -33,8 +35,7 @@ CLI::Option *add_time(CLI::App &app, const std::string &name, redag::Duration &t
 }
 
 std::optional<int> parse_arguments(CLI::App &app, int argc, char **argv) {
-  // The description and the options fit 80 columns by their own line ends.
-  constexpr std::size_t kColumn = 28;
+  constexpr std::size_t kColumn = 28;  // texts of options bring the line ends for 80 columns
   app.get_formatter()->column_width(kColumn);
   std::vector<std::string> words = rclcpp::remove_ros_arguments(argc, argv);
   words.erase(words.begin());
@@ -46,8 +47,18 @@ std::optional<int> parse_arguments(CLI::App &app, int argc, char **argv) {
     fmt::print("{}", app.help());
     return kExitOk;
   } catch (const CLI::ParseError &error) {
-    note({{.message = error.what(), .hint = fmt::format("'{} --help' lists the options", app.get_name())}});
+    note(redag::make_error(error.what(), fmt::format("'{} --help' lists the options", app.get_name())).value());
     return kExitBad;
+  }
+}
+
+void on_interrupt(void (*handler)(int)) {
+  struct sigaction action {};
+  action.sa_handler = handler;
+  action.sa_flags = SA_RESTART;
+  sigemptyset(&action.sa_mask);
+  for (const int number : {SIGINT, SIGTERM}) {
+    REDAG_CHECK(sigaction(number, &action, nullptr) == 0, "cannot install a signal handler");
   }
 }
 

@@ -26,10 +26,10 @@ using redag::Result;
 
 constexpr const char *kDescription =
     R"(Replays a bag to ReDAGExecutors in lockstep: each replay runs the same callbacks
-in the same order, however busy the machine is.)";
+in the same order, however busy the machine is.
+)";
 
-constexpr const char *kFooter = R"(
-The executors have the parameter lockstep:=true, and their nodes
+constexpr const char *kFooter = R"(The executors have the parameter lockstep:=true, and their nodes
 use_sim_time:=true. Start them before the player. Ctrl-C ends the replay early.
 
 Examples:
@@ -57,10 +57,7 @@ void add_options(CLI::App &app, Arguments &arguments) {
       ->required();
   add_number<std::uint32_t>(app, "--executors", play.executors, 0,
                             "Executors in lockstep that must follow; 0: wait for\nnone, as 'ros2 bag play --clock'");
-  app.add_option("--topics", arguments.topics, "Topics to play (default: all of the bag but /clock)")
-      ->type_name("A[,B...]")
-      ->delimiter(',')
-      ->expected(1)
+  add_list(app, "--topics", arguments.topics, "Topics to play (default: all of the bag but /clock)")
       ->check([](const std::string &name) {
         return name.rfind('/', 0) == 0 ? std::string()
                                        : fmt::format("'{}' is no full name of a topic (for example /scan)", name);
@@ -76,12 +73,11 @@ void add_options(CLI::App &app, Arguments &arguments) {
                  "start and the hash of their order. Two replays\n"
                  "differ from the first line that differs.")
       ->type_name("FILE");
-  app.add_option("--shuffle", play.shuffle,
-                 "Publish what belongs to an instant in random order\n"
-                 "with random pauses, by this seed: a test, whose\n"
-                 "results must be the same")
-      ->type_name("N")
-      ->check(CLI::Validator(CLI::PositiveNumber).description(""));
+  add_number<std::uint64_t>(app, "--shuffle", play.shuffle, 1,
+                            "Publish what belongs to an instant in random order\n"
+                            "with random pauses, by this seed: a test, whose\n"
+                            "results must be the same")
+      ->default_str("");
 }
 
 // Names of executors differ from run to run.
@@ -163,11 +159,7 @@ int main(int argc, char **argv) {
   try {
     if (const std::optional<int> done = parse_arguments(app, argc, argv)) return *done;
     rclcpp::init(argc, argv, rclcpp::InitOptions(), rclcpp::SignalHandlerOptions::None);
-    struct sigaction action {};
-    action.sa_handler = [](int) { interrupted = 1; };
-    for (const int number : {SIGINT, SIGTERM}) {
-      REDAG_CHECK(sigaction(number, &action, nullptr) == 0, "cannot install a signal handler");
-    }
+    on_interrupt([](int) { interrupted = 1; });
     status = run(arguments);
     rclcpp::shutdown();
   } catch (const std::exception &error) {

@@ -34,10 +34,10 @@ namespace {
 namespace fs = std::filesystem;
 constexpr const char *kDescription =
     R"(Runs a workload as real ROS 2 nodes with synthetic callbacks, and measures
-every job.)";
+every job.
+)";
 
-constexpr const char *kFooter = R"(
-There is a node for each task (such as /control/ekf), a wall timer for each
+constexpr const char *kFooter = R"(There is a node for each task (such as /control/ekf), a wall timer for each
 timer task, and a topic for each task with successors. A release is a point of
 the timer's grid, or the end of the last predecessor. A release that never ran
 is a miss. Ctrl-C ends the run early and shows the results so far.
@@ -71,16 +71,6 @@ void on_signal(int number) {
   if (const pid_t to = child.load(); to > 0) kill(to, number);
 }
 
-void handle_signals() {
-  struct sigaction action {};
-  action.sa_handler = on_signal;
-  action.sa_flags = SA_RESTART;
-  sigemptyset(&action.sa_mask);
-  for (const int number : {SIGINT, SIGTERM}) {
-    REDAG_CHECK(sigaction(number, &action, nullptr) == 0, "cannot install a signal handler");
-  }
-}
-
 // ---- arguments ----
 
 void check_executors(const std::vector<std::string> &names) {
@@ -99,16 +89,13 @@ void add_options(CLI::App &app, Arguments &arguments) {
   constexpr std::uint32_t kMostThreads = 4096;
   WorkloadRunOptions &run = arguments.run;
   app.add_option("WORKLOAD", arguments.file, "A workload file")->type_name("FILE")->required();
-  app.add_option("--executor", arguments.executors,
-                 "Executors (default: redag). ReDAG-RT: redag (with\n"
-                 "the workload's preemption), redag-none,\n"
-                 "redag-cooperative, redag-os. Of rclcpp: mte, ste,\n"
-                 "static, events. EventsCBGExecutor, if built: cbg.\n"
-                 "Several run in turn, each in its own process, and\n"
-                 "are compared.")
-      ->type_name("A[,B...]")
-      ->delimiter(',')
-      ->expected(1);
+  add_list(app, "--executor", arguments.executors,
+           "Executors (default: redag). ReDAG-RT: redag (with\n"
+           "the workload's preemption), redag-none,\n"
+           "redag-cooperative, redag-os. Of rclcpp: mte, ste,\n"
+           "static, events. EventsCBGExecutor, if built: cbg.\n"
+           "Several run in turn, each in its own process, and\n"
+           "are compared.");
   add_time(app, "--duration", run.duration, 1, "Time in which jobs are released");
   add_time(app, "--warm-up", run.warm_up, 0, "Do not count jobs released in this time at\nthe start");
   add_number<std::uint64_t>(app, "--seed", run.seed, 0, "Seed of execution times; every executor gets the\nsame jobs");
@@ -118,10 +105,10 @@ void add_options(CLI::App &app, Arguments &arguments) {
       ->type_name("intra|inter")
       ->default_str("intra")
       ->check(CLI::Validator(CLI::IsMember({"intra", "inter"})).description(""));
-  app.add_option("--threads", run.threads,
-                 "Threads of the executor (default: the workload's\nworkers; ste, static and events have one)")
-      ->type_name("N")
-      ->check(CLI::Validator(CLI::Range(std::uint32_t{1}, kMostThreads)).description(""));
+  add_number<std::uint32_t>(
+      app, "--threads", run.threads, 1,
+      "Threads of the executor (default: the workload's\nworkers; ste, static and events have one)", kMostThreads)
+      ->default_str("");
   add_number<std::uint32_t>(app, "--repeat", arguments.repeat, 1, "Repetitions, in which the executors take turns");
   app.add_option("--out", arguments.folder,
                  "Folder for result files, as of 'redag run'; with\nseveral runs, DIR/EXECUTOR/REPETITION")
@@ -287,7 +274,7 @@ int run(int argc, char **argv) {
       return kExitBad;
     }
   }
-  handle_signals();
+  on_interrupt(on_signal);
   const bool several = arguments.executors.size() > 1 || arguments.repeat > 1;
   note(loaded->warnings);
   if (several) return run_all(loaded->workload, arguments);
