@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "child_process.hpp"
+#include "command_line.hpp"
 #include "composition_interfaces/srv/load_node.hpp"
 #include "contenders.hpp"
 #include "rclcpp/rclcpp.hpp"
@@ -40,36 +41,26 @@ constexpr double kWarmUp = 2;               // seconds at the start that the com
 constexpr std::chrono::seconds kLimit(30);  // of a container's answer
 constexpr const char *kOwnContainer = "--container";
 
-constexpr const char *kHelp = R"(Compares component containers on the components of image_proc.
+constexpr const char *kDescription = "Compares component containers on the components of image_proc.\n";
 
-  ros2 run redag_rclcpp_lab bench_image_pipeline [OPTION VALUE ...]
-
-  --rounds 3       runs of each container; the containers take turns
-  --seconds 10     measured time of a run
-  --only NAMES     some of the containers, as in: mt,redag-os
-  --width 640      size of the camera's images
-  --height 480
-  --rate 30        images a second
-  --control 500    calls of the control loop a second, of 0.3 ms each
-  --config FILE    workload file of redag's containers; the default is
-                   config/stacks/image_pipeline.yaml of redag_rclcpp. 'none':
-                   they start without a file
-  --logs FOLDER    keeps what the containers print
-
-Containers: single, mt, isolated (rclcpp's component_container,
+constexpr const char *kExplanation =
+    R"(Containers: single, mt, isolated (rclcpp's component_container,
 component_container_mt and component_container_isolated), events, cbg (rclcpp's
 container on these executors), redag-none, redag-coop, redag-os (redag_rclcpp's
 component_container). Prefix the command with `chrt -f 10` to give all threads
 of all containers a real-time priority; redag-os sets those of its own.
 
+Examples:
+  ros2 run redag_rclcpp_lab bench_image_pipeline --rounds 3 --seconds 8
+  ros2 run redag_rclcpp_lab bench_image_pipeline --only mt,redag-os --rate 60
+
 The figures are medians over the runs. Exit status: 0 success; 1 a container did
-not run to its end; 2 invalid options.
-)";
+not run to its end; 2 invalid options.)";
 
 /// What the components have as options.
 struct Rates {
-  double width = 640;
-  double height = 480;
+  int width = 640;
+  int height = 480;
   double images = 30;
   double control = 500;
 };
@@ -119,8 +110,7 @@ std::vector<Component> components(const Rates &rates, const std::string &folder)
       {own,
        "redag_rclcpp::lab::Camera",
        {},
-       {frame_period, rclcpp::Parameter("width", static_cast<int>(rates.width)),
-        rclcpp::Parameter("height", static_cast<int>(rates.height))}},
+       {frame_period, rclcpp::Parameter("width", rates.width), rclcpp::Parameter("height", rates.height)}},
       {"image_proc", "image_proc::DebayerNode"},
       {"image_proc", "image_proc::RectifyNode", {"image:=image_color"}},
       {"image_proc",
@@ -202,16 +192,20 @@ int main(int argc, char **argv) {
   Rates rates;
   redag_rclcpp::lab::StackComparison comparison;
   comparison.program = "bench_image_pipeline";
-  comparison.help = kHelp;
+  comparison.description = kDescription;
+  comparison.explanation = kExplanation;
   comparison.config =
       ament_index_cpp::get_package_share_directory("redag_rclcpp") + "/config/stacks/image_pipeline.yaml";
-  comparison.numbers = {{"--width", &rates.width, true},
-                        {"--height", &rates.height, true},
-                        {"--rate", &rates.images},
-                        {"--control", &rates.control}};
+  comparison.add_options = [&](CLI::App &app) {
+    using redag_rclcpp::lab::add_number;
+    add_number<int>(app, "--width", rates.width, 1, "Size of the camera's images");
+    add_number<int>(app, "--height", rates.height, 1, "");
+    add_number<double>(app, "--rate", rates.images, 0.001, "Images a second");
+    add_number<double>(app, "--control", rates.control, 0.001, "Calls of the control loop a second, of 0.3 ms each");
+  };
   for (const auto &[name, command] : containers("none")) comparison.contenders.push_back(name);
   comparison.measure = [&](const StackRun &run, const StackOptions &options) { return measure(run, options, rates); };
-  const int status = run_comparison(comparison, arguments);
+  const int status = run_comparison(comparison, argc, argv);
   rclcpp::shutdown();
   return status;
 }

@@ -24,6 +24,7 @@
 #include <vector>
 
 #include "child_process.hpp"
+#include "command_line.hpp"
 #include "peers.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "redag/runtime/clock.hpp"
@@ -49,23 +50,10 @@ constexpr int kJoints = 6;  // the last one is the gripper's
 constexpr const char *kRobot = "--robot";
 constexpr const char *kPlanner = "--planner";
 
-constexpr const char *kHelp = R"(Compares executors for controller_manager's update loop.
+constexpr const char *kDescription = "Compares executors for controller_manager's update loop.\n";
 
-  ros2 run redag_rclcpp_lab bench_ros2_control [OPTION VALUE ...]
-
-  --rounds 3       runs of each contender; the contenders take turns
-  --seconds 10     measured time of a run
-  --only NAMES     some of the contenders, as in: stock,redag-os
-  --rate 500       updates a second
-  --read 0.2       processor time in ms that reading the hardware takes
-  --planner 30     processor time in ms that the planner takes, 10 times a
-                   second
-  --config FILE    workload file of ReDAGExecutor; the default is
-                   config/stacks/ros2_control.yaml of redag_rclcpp. 'none': it
-                   starts without a file
-  --logs FOLDER    keeps what the processes print and note
-
-Contenders: stock is ros2_control_node, with the planner in a process of its
+constexpr const char *kExplanation =
+    R"(Contenders: stock is ros2_control_node, with the planner in a process of its
 own. All others are one process with the update loop as a timer: mte and cbg
 (where it was built) on executors of rclcpp, redag-none and redag-os on
 ReDAGExecutor. Prefix the command with `chrt -f 10` to give all threads
@@ -74,12 +62,15 @@ of all processes a real-time priority; stock and redag-os set some of their own.
 Single-threaded executors are left out. controller_manager's services wait for
 the update loop, which would wait for the service.
 
+Examples:
+  ros2 run redag_rclcpp_lab bench_ros2_control --only stock,redag-os
+  ros2 run redag_rclcpp_lab bench_ros2_control --rounds 5 --rate 1000 --read 0.1
+
 The figures are medians over the runs. Exit status: 0 success; 1 a process did
-not run to its end; 2 invalid options.
-)";
+not run to its end; 2 invalid options.)";
 
 struct Loads {
-  double rate = 500;
+  int rate = 500;
   double read = 0.2;
   double planner = 30;
 };
@@ -114,9 +105,9 @@ void write_parameters(const std::string &file, const StackRun &run, const StackO
     parameters("controller_manager")[controller]["type"] = "redag_rclcpp_lab/Forward";
     parameters(controller)["joints"] = joints;
   };
-  parameters("controller_manager")["update_rate"] = std::lround(loads.rate);
+  parameters("controller_manager")["update_rate"] = loads.rate;
   parameters("controller_manager")["joint_state_broadcaster"]["type"] = "joint_state_broadcaster/JointStateBroadcaster";
-  parameters("joint_state_broadcaster") = {{"update_rate", std::min(50L, std::lround(loads.rate))}};
+  parameters("joint_state_broadcaster") = {{"update_rate", std::min(50, loads.rate)}};
   forward("arm_controller", 1, kJoints - 1);
   forward("gripper_controller", kJoints, kJoints);
   forward("spare_controller", kJoints, kJoints);
@@ -249,12 +240,19 @@ int main(int argc, char **argv) {
   Loads loads;
   redag_rclcpp::lab::StackComparison comparison;
   comparison.program = "bench_ros2_control";
-  comparison.help = kHelp;
+  comparison.description = kDescription;
+  comparison.explanation = kExplanation;
   comparison.config = ament_index_cpp::get_package_share_directory("redag_rclcpp") + "/config/stacks/ros2_control.yaml";
-  comparison.numbers = {{"--rate", &loads.rate, true}, {"--read", &loads.read}, {"--planner", &loads.planner}};
+  comparison.add_options = [&](CLI::App &app) {
+    using redag_rclcpp::lab::add_number;
+    add_number<int>(app, "--rate", loads.rate, 1, "Updates a second");
+    add_number<double>(app, "--read", loads.read, 0, "Processor time in ms that reading the hardware\ntakes");
+    add_number<double>(app, "--planner", loads.planner, 0,
+                       "Processor time in ms that the planner takes, 10\ntimes a second");
+  };
   comparison.contenders = contenders();
   comparison.measure = [&](const StackRun &run, const StackOptions &options) { return measure(run, options, loads); };
-  const int status = run_comparison(comparison, arguments);
+  const int status = run_comparison(comparison, argc, argv);
   rclcpp::shutdown();
   return status;
 }

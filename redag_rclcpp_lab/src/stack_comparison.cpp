@@ -6,82 +6,16 @@
 #include <fmt/format.h>
 #include <stdlib.h>
 
-#include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <sstream>
+#include <optional>
 #include <stdexcept>
 
+#include "command_line.hpp"
 #include "samples.hpp"
 
 namespace redag_rclcpp::lab {
-
 namespace {
-
-double read_number(const std::string &option, const std::string &text, bool whole) {
-  std::size_t read = 0;
-  double value = 0;
-  try {
-    value = std::stod(text, &read);
-  } catch (const std::exception &) {
-    read = 0;
-  }
-  if (read != text.size() || text.empty() || !(value > 0) || !std::isfinite(value)) {
-    throw std::invalid_argument(fmt::format("{} is '{}', but must be a number above 0", option, text));
-  }
-  if (whole && (value != std::floor(value) || value > 1e6)) {
-    throw std::invalid_argument(fmt::format("{} is '{}', but must be a whole number of at most 1000000", option, text));
-  }
-  return value;
-}
-
-/// Throws std::invalid_argument for an unknown option or a bad value.
-StackOptions parse(const StackComparison &comparison, const std::vector<std::string> &arguments) {
-  StackOptions options;
-  options.config = comparison.config;
-  for (std::size_t i = 0; i < arguments.size(); i += 2) {
-    const std::string &option = arguments[i];
-    if (i + 1 == arguments.size()) throw std::invalid_argument(option + " needs a value, or is no option (see --help)");
-    const std::string &value = arguments[i + 1];
-    const auto number = std::find_if(comparison.numbers.begin(), comparison.numbers.end(),
-                                     [&](const NumberOption &candidate) { return candidate.name == option; });
-    if (number != comparison.numbers.end()) {
-      *number->value = read_number(option, value, number->whole);
-    } else if (option == "--rounds") {
-      options.rounds = static_cast<int>(read_number(option, value, true));
-    } else if (option == "--seconds") {
-      options.seconds = read_number(option, value, false);
-    } else if (option == "--only") {
-      options.only = value;
-    } else if (option == "--config") {
-      options.config = value;
-    } else if (option == "--logs") {
-      options.logs = value;
-    } else {
-      throw std::invalid_argument(option + " is no option (see --help)");
-    }
-  }
-  if (options.config != "none" && !std::filesystem::is_regular_file(options.config)) {
-    throw std::invalid_argument(fmt::format("--config: there is no file '{}'", options.config));
-  }
-  return options;
-}
-
-/// The contenders that --only names. Throws std::invalid_argument for an unknown one.
-std::vector<std::string> selected(const std::vector<std::string> &all, const std::string &only) {
-  if (only.empty()) return all;
-  std::vector<std::string> some;
-  std::istringstream names(only);
-  for (std::string name; std::getline(names, name, ',');) {
-    if (std::find(all.begin(), all.end(), name) == all.end()) {
-      throw std::invalid_argument(
-          fmt::format("--only: '{}' is not in this comparison, which has: {}", name, fmt::join(all, ", ")));
-    }
-    some.push_back(name);
-  }
-  return some;
-}
 
 using Results = std::map<std::string, std::map<std::string, std::vector<double>>>;  // by figure, then by contender
 
@@ -102,9 +36,10 @@ void print_medians(const Results &results, const std::vector<std::string> &conte
   fmt::print("\n");
 }
 
-int compare(const StackComparison &comparison, const StackOptions &options,
-            const std::vector<std::string> &contenders) {
-  std::string folder = options.logs;
+// With an empty `logs`, what the processes print is kept only if a run fails.
+int compare(const StackComparison &comparison, const StackOptions &options, const std::vector<std::string> &contenders,
+            const std::string &logs) {
+  std::string folder = logs;
   if (folder.empty()) {
     folder = (std::filesystem::temp_directory_path() / (comparison.program + ".XXXXXX")).string();
     if (mkdtemp(folder.data()) == nullptr) throw std::runtime_error("cannot make a folder such as " + folder);
@@ -126,36 +61,46 @@ int compare(const StackComparison &comparison, const StackOptions &options,
       } catch (const std::exception &error) {
         fmt::print(stderr, "{}: {}: {}; what its processes printed is in {}\n", comparison.program, contender,
                    error.what(), run.folder);
-        return 1;
+        return kExitNo;
       }
     }
   }
-  if (options.logs.empty()) std::filesystem::remove_all(folder);
+  if (logs.empty()) std::filesystem::remove_all(folder);
   print_medians(results, contenders);
-  return 0;
+  return kExitOk;
 }
 
 }  // namespace
 
-int run_comparison(const StackComparison &comparison, const std::vector<std::string> &arguments) {
-  if (std::count(arguments.begin(), arguments.end(), "--help") != 0) {
-    fmt::print("{}", comparison.help);
-    return 0;
-  }
+int run_comparison(const StackComparison &comparison, int argc, char **argv) {
   StackOptions options;
-  std::vector<std::string> contenders;
+  options.config = comparison.config;
+  std::vector<std::string> contenders = comparison.contenders;
+  std::string logs;
+  CLI::App app(comparison.description, comparison.program);
+  app.footer(comparison.explanation);
+  add_number<int>(app, "--rounds", options.rounds, 1, "Runs of each contender, which take turns");
+  add_number<double>(app, "--seconds", options.seconds, 0.001, "Measured time of a run");
+  add_list(app, "--only", contenders, "Some of the contenders")
+      ->check(CLI::Validator(CLI::IsMember(comparison.contenders)).description(""));
+  app.add_option("--config", options.config,
+                 fmt::format("Workload file of ReDAGExecutor (default:\n"
+                             "config/stacks/{} of redag_rclcpp);\n"
+                             "none: it starts without a file",
+                             std::filesystem::path(comparison.config).filename().string()))
+      ->type_name("FILE")
+      ->check([](const std::string &file) {
+        return file == "none" || std::filesystem::is_regular_file(file) ? std::string()
+                                                                        : fmt::format("there is no file '{}'", file);
+      });
+  app.add_option("--logs", logs, "Keeps what the processes print and note")->type_name("FOLDER");
+  comparison.add_options(app);
+  if (const std::optional<int> status = parse_arguments(app, argc, argv)) return *status;
   try {
-    options = parse(comparison, arguments);
-    contenders = selected(comparison.contenders, options.only);
-  } catch (const std::invalid_argument &error) {
-    fmt::print(stderr, "{}: {}\n", comparison.program, error.what());
-    return 2;
-  }
-  try {
-    return compare(comparison, options, contenders);
+    return compare(comparison, options, contenders, logs);
   } catch (const std::exception &error) {
     fmt::print(stderr, "{}: {}\n", comparison.program, error.what());
-    return 1;
+    return kExitNo;
   }
 }
 

@@ -6,6 +6,7 @@
 // bench_image_pipeline say which contenders there are and what one run does.
 #pragma once
 
+#include <CLI/CLI.hpp>
 #include <functional>
 #include <map>
 #include <string>
@@ -15,18 +16,9 @@ namespace redag_rclcpp::lab {
 
 /// Options that every comparison has.
 struct StackOptions {
-  int rounds = 3;       // --rounds
-  double seconds = 10;  // --seconds, of a run
-  std::string only;     // --only: names of contenders, separated by commas; "": all
-  std::string config;   // --config: workload file for redag's executors; "none": they start without a file
-  std::string logs;     // --logs: folder for what the processes print; "": it is kept only if a run fails
-};
-
-/// An option of one comparison, whose value is a number above 0.
-struct NumberOption {
-  std::string name;  // "--rate"
-  double *value;
-  bool whole = false;  // a whole number of at most 1,000,000
+  int rounds = 3;
+  double seconds = 10;  // measured time of a run
+  std::string config;   // workload file for redag's executors; "none": they start without a file
 };
 
 /// What was measured, by name.
@@ -42,17 +34,18 @@ struct StackRun {
 };
 
 struct StackComparison {
-  std::string program;  // its name, for messages
-  std::string help;     // printed for --help
-  std::string config;   // default of --config
-  std::vector<NumberOption> numbers{};
+  std::string program;      // its name
+  std::string description;  // for --help, before the options
+  std::string explanation;  // for --help, behind them
+  std::string config;       // default of --config
   std::vector<std::string> contenders;
+  std::function<void(CLI::App &)> add_options;  // those of this comparison alone
   /// Does one run. Throws std::exception if it does not go to its end.
   std::function<Figures(const StackRun &, const StackOptions &)> measure;
 };
 
-/// The main function of a comparison. `arguments`: without the program's name. Prints medians to stdout, and progress
-/// to stderr. Returns the exit status: 0 success, 1 a run failed, 2 invalid options.
-int run_comparison(const StackComparison &comparison, const std::vector<std::string> &arguments);
+/// The main function of a comparison. Prints medians to stdout, and progress to stderr. Returns the exit status: 0
+/// success, 1 a run failed, 2 invalid options.
+int run_comparison(const StackComparison &comparison, int argc, char **argv);
 
 }  // namespace redag_rclcpp::lab

@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "child_process.hpp"
+#include "command_line.hpp"
 
 namespace redag_rclcpp::lab {
 namespace {
@@ -33,9 +34,12 @@ class StackComparisonTest : public ::testing::Test {
  protected:
   StackComparisonTest() {
     comparison_.program = "bench_test";
-    comparison_.help = "the help\n";
+    comparison_.description = "the help\n";
     comparison_.config = "none";
-    comparison_.numbers = {{"--rate", &rate_}, {"--width", &width_, true}};
+    comparison_.add_options = [this](CLI::App &app) {
+      add_number<double>(app, "--rate", rate_, 0.001, "");
+      add_number<int>(app, "--width", width_, 1, "", 1000);
+    };
     comparison_.contenders = {"plain", "redag"};
     comparison_.measure = [this](const StackRun &run, const StackOptions &options) {
       runs_.push_back(run.contender);
@@ -48,17 +52,20 @@ class StackComparisonTest : public ::testing::Test {
     };
   }
 
-  int run(const Strings &arguments) {
+  int run(Strings arguments) {
+    arguments.insert(arguments.begin(), "bench_test");
+    std::vector<char *> argv;
+    for (std::string &argument : arguments) argv.push_back(argument.data());
     testing::internal::CaptureStdout();
     testing::internal::CaptureStderr();
-    const int status = run_comparison(comparison_, arguments);
+    const int status = run_comparison(comparison_, static_cast<int>(argv.size()), argv.data());
     printed_ = testing::internal::GetCapturedStdout();
     complained_ = testing::internal::GetCapturedStderr();
     return status;
   }
 
   double rate_ = 30;
-  double width_ = 640;
+  int width_ = 640;
   std::string failing_;
   StackComparison comparison_;
   Strings runs_;
@@ -97,26 +104,28 @@ TEST_F(StackComparisonTest, AFailedRunEndsItAndKeepsWhatWasPrinted) {
 
 TEST_F(StackComparisonTest, BadOptionsAreNamed) {
   const std::vector<std::pair<Strings, std::string>> cases = {
-      {{"--rounds", "0"}, "--rounds is '0', but must be a number above 0"},
-      {{"--rounds", "1.5"}, "--rounds is '1.5', but must be a whole number of at most 1000000"},
-      {{"--seconds", "5x"}, "--seconds is '5x', but must be a number above 0"},
-      {{"--rate", "inf"}, "--rate is 'inf', but must be a number above 0"},
-      {{"--width", "2.5"}, "--width is '2.5', but must be a whole number of at most 1000000"},
-      {{"--height", "3"}, "--height is no option (see --help)"},
-      {{"--rounds"}, "--rounds needs a value, or is no option (see --help)"},
-      {{"--only", "plain,other"}, "--only: 'other' is not in this comparison, which has: plain, redag"},
+      {{"--rounds", "0"}, "--rounds: '0' is not a whole number of at least 1"},
+      {{"--rounds", "1.5"}, "--rounds: '1.5' is not a whole number of at least 1"},
+      {{"--seconds", "5x"}, "--seconds: '5x' is not a number of at least 0.001"},
+      {{"--rate", "inf"}, "--rate: 'inf' is not a number of at least 0.001"},
+      {{"--rate", "nan"}, "--rate: 'nan' is not a number of at least 0.001"},
+      {{"--width", "-1"}, "--width: '-1' is not a whole number from 1 to 1000"},
+      {{"--width", "1001"}, "--width: '1001' is not a whole number from 1 to 1000"},
+      {{"--height", "3"}, "The following arguments were not expected: --height 3"},
+      {{"--rounds"}, "--rounds requires 1 argument"},
+      {{"--only", "plain,other"}, "--only: other not in {plain,redag}"},
       {{"--config", "/nowhere/x.yaml"}, "--config: there is no file '/nowhere/x.yaml'"},
   };
   for (const auto &[arguments, message] : cases) {
     EXPECT_EQ(run(arguments), 2) << message;
-    EXPECT_EQ(complained_, "bench_test: " + message + "\n");
+    EXPECT_EQ(complained_, "error: " + message + " ('bench_test --help' lists the options)\n");
   }
   EXPECT_THAT(runs_, IsEmpty());
 }
 
 TEST_F(StackComparisonTest, HelpIsPrinted) {
   EXPECT_EQ(run({"--rounds", "1", "--help"}), 0);
-  EXPECT_EQ(printed_, "the help\n");
+  EXPECT_THAT(printed_, AllOf(HasSubstr("the help\n"), HasSubstr("--width N=640"), HasSubstr("--rounds N=3")));
   EXPECT_THAT(runs_, IsEmpty());
 }
 
