@@ -137,7 +137,7 @@ class Writer {
       line("cpus: \"{}\"", text_of(cpu_sets_.front()));
     } else {
       line("cpu_sets:");
-      for (const std::set<int> &cpus : cpu_sets_) line("  - {{name: \"cpus {0}\", cpus: \"{0}\"}}", text_of(cpus));
+      for (const std::set<int> &cpus : cpu_sets_) line(R"(  - {{name: "cpus {0}", cpus: "{0}"}})", text_of(cpus));
     }
     line("# A process for each node: move the DAGs of nodes that share a container into one process.");
     line("processes:");
@@ -272,7 +272,7 @@ class Writer {
     if (!configuration_.interrupts.empty()) line("irqs:");
     std::set<std::string> names;
     for (const Interrupt &interrupt : configuration_.interrupts) {
-      line("  - {{name: {}, match: \"{}\", cpus: \"{}\"}}", unique(fmt::format("irq_{}", interrupt.number), names),
+      line(R"(  - {{name: {}, match: "{}", cpus: "{}"}})", unique(fmt::format("irq_{}", interrupt.number), names),
            interrupt.number, format_cpu_list(interrupt.cpus));
     }
   }

@@ -218,6 +218,7 @@ class Reader : private yaml::ValueReader {
     });
     if (found == kPolicies.end()) {
       std::vector<std::string_view> names;
+      names.reserve(kPolicies.size());
       for (const auto &[name, value] : kPolicies) names.emplace_back(name);
       return unknown_choice(*policy, "policy", names);
     }

@@ -26,7 +26,7 @@ std::int64_t key_of(PolicyKind policy, const Task &task) {
 
 class Planner {
  public:
-  Planner(const Robot &robot, runtime::PriorityBand band) : robot_(robot), band_(band) {}
+  Planner(const Robot &robot, runtime::PriorityBand band) : robot_(robot), band_(std::move(band)) {}
 
   Result<Plan> run() {
     if (robot_.by_bounds && !robot_.assigned) {
@@ -121,7 +121,7 @@ class Planner {
 
 }  // namespace
 
-Result<Plan> plan_of(const Robot &robot, runtime::PriorityBand band) { return Planner(robot, band).run(); }
+Result<Plan> plan_of(const Robot &robot, runtime::PriorityBand band) { return Planner(robot, std::move(band)).run(); }
 
 std::string levels_text(const std::vector<int> &priorities) { return fmt::format("{}", fmt::join(priorities, ",")); }
 

@@ -41,7 +41,8 @@ void ProcessorsReader::read_host(const Node &node) {
   }
   robot_.hosts.push_back(set.name);
   host_ = set.host;
-  read_processors(node, fmt::format("host '{}'", set.name), std::move(set));
+  const std::string what = fmt::format("host '{}'", set.name);
+  read_processors(node, what, std::move(set));
 }
 
 void ProcessorsReader::read_processors(const Node &map, const std::string &what, CpuSet set) {

@@ -128,6 +128,9 @@ TEST(RobotYaml, MistakesInHostsAreFound) {
             "(choose a task of the same host)");
   EXPECT_EQ(findings(std::string(kBase) + "irqs: [{name: can, match: can, cpus: 1, host: drive}]\n"),
             "cart.yaml:16:47: error: there is no host 'drive' (remove 'host:': the robot has no 'hosts:')");
+  EXPECT_NE(findings("robot: cart\nhosts:\n  - {name: vision}\n")
+                .find("cart.yaml:3:5: error: host 'vision' names no processors"),
+            std::string::npos);
   std::string same = two;
   same.replace(same.find("name: control, cpus: 0"), 13, "name: vision");
   EXPECT_NE(findings(same).find("cart.yaml:5:23: error: the name 'vision' is used by another entry of this list"),
