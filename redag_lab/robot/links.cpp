@@ -23,7 +23,9 @@ struct Responses {
   std::vector<std::optional<Duration>> dags;   // by DagId, from the release of the source on
 };
 
-Result<Responses> responses_of(const Workload &workload, const analysis::AnalysisPlatform &platform) {
+// `fill` writes the responses of each CPU set's tasks and DAGs.
+template <class Fill>
+Result<Responses> collect(const Workload &workload, const analysis::AnalysisPlatform &platform, Fill fill) {
   Responses responses;
   responses.tasks.resize(workload.task_count());
   responses.dags.resize(workload.dags.size());
@@ -31,29 +33,25 @@ Result<Responses> responses_of(const Workload &workload, const analysis::Analysi
     if (part.workload.dags.empty()) continue;
     const Result<analysis::TaskSet> task_set = analysis::compile(part.workload, analysis::platform_of(platform, part));
     if (!task_set) return tl::unexpected<Diagnostics>(task_set.error());
-    const analysis::Report report = analysis::analyze(*task_set);
-    for (std::size_t t = 0; t < part.tasks.size(); ++t) responses.tasks[part.tasks[t].value] = report.tasks[t].response;
-    for (std::size_t d = 0; d < part.dags.size(); ++d) responses.dags[part.dags[d].value] = report.dags[d].response;
+    fill(part, *task_set, responses);
   }
   return responses;
 }
 
+// By the bounds.
+void fill_bounds(const ClusterPart &part, const analysis::TaskSet &task_set, Responses &responses) {
+  const analysis::Report report = analysis::analyze(task_set);
+  for (std::size_t t = 0; t < part.tasks.size(); ++t) responses.tasks[part.tasks[t].value] = report.tasks[t].response;
+  for (std::size_t d = 0; d < part.dags.size(); ++d) responses.dags[part.dags[d].value] = report.dags[d].response;
+}
+
 // Of a schedule that keeps all deadlines.
-Result<Responses> deadlines_of(const Workload &workload, const analysis::AnalysisPlatform &platform) {
-  Responses responses;
-  responses.tasks.resize(workload.task_count());
-  responses.dags.resize(workload.dags.size());
-  for (const ClusterPart &part : parts_of(workload)) {
-    if (part.workload.dags.empty()) continue;
-    const Result<analysis::TaskSet> task_set = analysis::compile(part.workload, analysis::platform_of(platform, part));
-    if (!task_set) return tl::unexpected<Diagnostics>(task_set.error());
-    for (const analysis::Unit &unit : task_set->units) {
-      const Duration due = std::min(unit.deadline, unit.limit);
-      for (const std::uint32_t t : unit.tasks) responses.tasks[part.tasks[t].value] = due;
-      if (task_set->dags[unit.dag.value].units.size() == 1) responses.dags[part.dags[unit.dag.value].value] = due;
-    }
+void fill_deadlines(const ClusterPart &part, const analysis::TaskSet &task_set, Responses &responses) {
+  for (const analysis::Unit &unit : task_set.units) {
+    const Duration due = std::min(unit.deadline, unit.limit);
+    for (const std::uint32_t t : unit.tasks) responses.tasks[part.tasks[t].value] = due;
+    if (task_set.dags[unit.dag.value].units.size() == 1) responses.dags[part.dags[unit.dag.value].value] = due;
   }
-  return responses;
 }
 
 // A link in the union.
@@ -139,7 +137,7 @@ Result<void> set_jitter_of_links(const Robot &robot, const std::vector<std::size
   if (robot.links.empty()) return {};
   Iteration iteration(robot, first_task, united);
   for (int round = 0; round < kMostRounds; ++round) {
-    const Result<Responses> responses = responses_of(united, platform);
+    const Result<Responses> responses = collect(united, platform, fill_bounds);
     if (!responses) return tl::unexpected<Diagnostics>(responses.error());
     const Result<bool> changed = iteration.step(*responses, "lower the load, or the rate");
     if (!changed) return tl::unexpected<Diagnostics>(changed.error());
@@ -151,7 +149,7 @@ Result<void> set_jitter_of_links(const Robot &robot, const std::vector<std::size
 Result<void> set_jitter_by_deadlines(const Robot &robot, const std::vector<std::size_t> &first_task,
                                      const analysis::AnalysisPlatform &platform, Workload &united) {
   if (robot.links.empty()) return {};
-  const Result<Responses> deadlines = deadlines_of(united, platform);
+  const Result<Responses> deadlines = collect(united, platform, fill_deadlines);
   if (!deadlines) return tl::unexpected<Diagnostics>(deadlines.error());
   const Result<bool> changed = Iteration(robot, first_task, united)
                                    .step(*deadlines,
