@@ -115,8 +115,8 @@ std::string_view without_slashes(std::string_view text) {
 
 /// A callback that no file names is "/imu timer 2 ms (0)" in the DAG "/imu". Returns what follows the DAG's name.
 std::string_view within(std::string_view task, std::string_view dag) {
-  const bool has_prefix = !dag.empty() && task.size() > dag.size() + 1 && task.substr(0, dag.size()) == dag &&
-                          task[dag.size()] == ' ';
+  const bool has_prefix =
+      !dag.empty() && task.size() > dag.size() + 1 && task.substr(0, dag.size()) == dag && task[dag.size()] == ' ';
   return has_prefix ? task.substr(dag.size() + 1) : task;
 }
 
@@ -147,9 +147,8 @@ bool LiveStatistics::update(const std::vector<Listed> &pages, redag::Time now) {
   for (const Listed &listed : pages) {
     if (listed.page) readable.push_back(&listed);
   }
-  std::stable_sort(readable.begin(), readable.end(), [](const Listed *a, const Listed *b) {
-    return a->page->frame.began < b->page->frame.began;
-  });
+  std::stable_sort(readable.begin(), readable.end(),
+                   [](const Listed *a, const Listed *b) { return a->page->frame.began < b->page->frame.began; });
   name_executors(readable);
   const bool is_first = names_.empty();
   has_changed_ = false;
@@ -173,9 +172,7 @@ bool LiveStatistics::update(const std::vector<Listed> &pages, redag::Time now) {
 void LiveStatistics::name_executors(const std::vector<const Listed *> &pages) {
   std::map<Key, std::string> named;
   std::set<std::string, std::less<>> taken;
-  const auto key_of = [](const Listed &listed) {
-    return Key(listed.pid, listed.page->process.start, listed.number);
-  };
+  const auto key_of = [](const Listed &listed) { return Key(listed.pid, listed.page->process.start, listed.number); };
   for (const Listed *listed : pages) {
     const auto known = executors_.find(key_of(*listed));
     if (known == executors_.end()) continue;

@@ -25,12 +25,9 @@ inline redag::live::Frame small_frame(const std::string &name = "robot", redag::
   frame.published = began + 10 * kSecond;
   frame.window = 2 * kSecond;
   frame.dags = {{.name = "control", .max_active = 1, .deadline = 5 * kMillisecond, .late = 3}, {.name = "/ns/imu"}};
-  frame.tasks = {{.name = "pid",
-                  .dag = 0,
-                  .period = 10 * kMillisecond,
-                  .deadline = 8 * kMillisecond,
-                  .bound = 2 * kMillisecond},
-                 {.name = "/ns/imu timer 2 ms (0)", .dag = 1, .period = 2 * kMillisecond}};
+  frame.tasks = {
+      {.name = "pid", .dag = 0, .period = 10 * kMillisecond, .deadline = 8 * kMillisecond, .bound = 2 * kMillisecond},
+      {.name = "/ns/imu timer 2 ms (0)", .dag = 1, .period = 2 * kMillisecond}};
   redag::live::page::Figures &figures = frame.tasks[0].figures;
   figures.released = 100;
   figures.finished = 97;

@@ -73,9 +73,9 @@ TEST(LiveStatistics, LeaveOutWhatARowDoesNotHave) {
 TEST(LiveStatistics, SelectFigures) {
   LiveStatistics statistics({"misses", "alert"}, 1);
   statistics.update({listed(small_frame())}, 20 * kSecond);
-  EXPECT_THAT(statistics.names(), ElementsAre("robot/alert", "robot/control/misses", "robot/ns/imu/misses",
-                                              "robot/control/pid/misses", "robot/ns/imu/timer 2 ms (0)/misses",
-                                              "executors", "unreadable_pages", "left_out"));
+  EXPECT_THAT(statistics.names(),
+              ElementsAre("robot/alert", "robot/control/misses", "robot/ns/imu/misses", "robot/control/pid/misses",
+                          "robot/ns/imu/timer 2 ms (0)/misses", "executors", "unreadable_pages", "left_out"));
   for (const std::string &name : statistics.names()) {
     const std::string figure = name.substr(name.rfind('/') + 1);
     if (figure != name) {

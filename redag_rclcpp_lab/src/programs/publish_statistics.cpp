@@ -55,8 +55,7 @@ void check(const Arguments &arguments) {
   const auto known = known_figures();
   for (const std::string &figure : arguments.figures) {
     if (known.count(figure) == 0) {
-      throw CLI::ValidationError("--figures",
-                                 fmt::format("'{}' is not one of {}", figure, fmt::join(known, ", ")));
+      throw CLI::ValidationError("--figures", fmt::format("'{}' is not one of {}", figure, fmt::join(known, ", ")));
     }
   }
 }
@@ -86,7 +85,7 @@ int run(const Arguments &arguments, int argc, char **argv) {
 #else
 int run(const Arguments &, int, char **) {
   note(redag::make_error("this publish_statistics was built without pal_statistics_msgs",
-                         "install ros-$ROS_DISTRO-pal-statistics-msgs, and build redag_rclcpp_lab again")
+                         "install pal_statistics_msgs of your distribution, and build redag_rclcpp_lab again")
            .value());
   return kExitBad;
 }
