@@ -5,9 +5,13 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/wait.h>
 
 #include <algorithm>
+#include <array>
+#include <cstdio>
 #include <optional>
+#include <utility>
 
 #include "live_frames.hpp"
 
@@ -19,9 +23,9 @@ using redag::live::Frame;
 using redag::live::Listed;
 using ::testing::Contains;
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
-using ::testing::UnorderedElementsAre;
 
 Listed listed(Frame frame, std::int64_t pid = 12, std::uint32_t number = 0, std::uint64_t start = 1) {
   return Listed{redag::live::page_path("/x", pid, number), pid, number,
@@ -171,6 +175,38 @@ TEST(LiveStatistics, HaveAMostNumberOfValues) {
   EXPECT_EQ(all.values().size(), kMostStatistics + 3);
   EXPECT_GT(value(all, "left_out"), 0);
 }
+
+/// Runs publish_statistics with `arguments`. Returns its exit status, and what it wrote.
+std::pair<int, std::string> run_program(const std::string &arguments) {
+  std::FILE *const pipe = popen((PUBLISHER " " + arguments + " 2>&1").c_str(), "r");
+  if (pipe == nullptr) return {-1, "popen failed"};
+  std::string text;
+  std::array<char, 4096> part{};
+  for (std::size_t size = 0; (size = std::fread(part.data(), 1, part.size(), pipe)) > 0;)
+    text.append(part.data(), size);
+  return {WEXITSTATUS(pclose(pipe)), text};
+}
+
+TEST(PublishStatistics, RefusesBadInput) {
+  const auto [figure_status, figure] = run_program("--figures misses,nonsense");
+  EXPECT_EQ(figure_status, 2);
+  EXPECT_THAT(figure, HasSubstr("'nonsense' is not one of aborted, active, "));
+  const auto [folder_status, folder] = run_program("--folder /nowhere/at/all");
+  EXPECT_EQ(folder_status, 2);
+  EXPECT_THAT(folder, HasSubstr("'/nowhere/at/all' is not a folder"));
+  EXPECT_EQ(run_program("--period 0ms").first, 2);
+  const auto [help_status, help] = run_program("--help");
+  EXPECT_EQ(help_status, 0);
+  EXPECT_THAT(help, HasSubstr("--figures"));
+}
+
+#ifndef REDAG_PAL_STATISTICS
+TEST(PublishStatistics, SaysThatItsMessagesAreMissing) {
+  const auto [status, text] = run_program("");
+  EXPECT_EQ(status, 2);
+  EXPECT_THAT(text, HasSubstr("was built without pal_statistics_msgs"));
+}
+#endif
 
 }  // namespace
 }  // namespace redag_rclcpp::lab
