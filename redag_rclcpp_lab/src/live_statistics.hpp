@@ -23,7 +23,7 @@
 
 namespace redag_rclcpp::lab {
 
-/// Most values of executors in one message. A thousand callbacks have about 28,000.
+/// Most values of executors in one message. A thousand callbacks with their DAGs have about 30,000.
 inline constexpr std::size_t kMostStatistics = 65'536;
 
 class LiveStatistics {
