@@ -129,6 +129,7 @@ struct Dag {
   Criticality criticality = Criticality::Normal;
   Degrade degrade;           // only used if the DAG is not of high criticality
   std::string cluster = {};  // name of the cluster that serves it; empty: the only one, or the whole platform
+  bool is_foreign = false;   // stands for threads of other programs, which have no deadline to meet
 
   /// Its share of U (eq. utilization). Tasks without a period have none.
   [[nodiscard]] double utilization() const;

@@ -45,22 +45,19 @@ const char *to_text(Miss miss) {
 
 class PerfettoWriter::Impl {
  public:
-  Impl(trace::OutputFile file, const trace::RunInfo &run, const KernelRecord *kernel)
-      : writer_(std::move(file)),
-        run_(run),
-        kernel_(kernel),
-        refs_(flatten(run.workload)),
-        watch_(run.workload),
-        counters_(writer_) {
+  Impl(trace::OutputFile file, const trace::RunInfo &run, std::optional<KernelReader> kernel)
+      : writer_(std::move(file)), run_(run), refs_(flatten(run.workload)), watch_(run.workload), counters_(writer_) {
     write_run();
     add_workers();
     add_tasks();
-    if (kernel_ != nullptr) add_kernel();
+    if (kernel) kernel_.emplace(writer_, *std::move(kernel), run.start);
   }
 
   void add(const JobEvent &event) {
     if (event.task.value >= tasks_.size()) return;
     last_time_ = std::max(last_time_, event.time);
+    // Some time ahead, because the recorder logs a job's thread after the body began.
+    if (kernel_ && kernel_read_) kernel_read_ = kernel_->read_until(event.time + 100 * kMillisecond);
     counters_.advance(since_start(last_time_));
     watch_.add(std::span(&event, 1), [&](const JudgedJob &judged) { finish(event, judged); });
     if (event.kind == JobEventKind::Released) return release(event);
@@ -98,6 +95,8 @@ class PerfettoWriter::Impl {
       if (Live *const job = find(task, judged.record.number); job != nullptr) close(*job, task, end, end, judged);
     });
     counters_.advance(kNever);
+    if (kernel_ && kernel_read_) kernel_read_ = kernel_->finish();
+    if (!kernel_read_) return kernel_read_;
     return writer_.commit();
   }
 
@@ -225,20 +224,6 @@ class PerfettoWriter::Impl {
     for (TaskState &task : tasks_) task.data.resize(task.successors.size());
   }
 
-  void add_kernel() {
-    perfetto::write_kernel(writer_, *kernel_, run_.start, run_.workload.name);
-    for (const JobThread &job : kernel_->jobs) {
-      thread_of_[job_key(job.task, job.number)] = job.thread;
-      if (threads_.contains(job.thread)) continue;
-      threads_[job.thread] =
-          writer_.add_thread(perfetto::thread_name(*kernel_, job.thread), perfetto::process_of(*kernel_), job.thread);
-    }
-  }
-
-  static std::uint64_t job_key(TaskId task, std::uint32_t number) {
-    return (std::uint64_t{task.value} << 32U) | number;
-  }
-
   [[nodiscard]] std::string waits_for(std::int64_t device) const {
     const std::vector<Device> &devices = run_.workload.platform.devices;
     const bool is_known = device >= 0 && device < static_cast<std::int64_t>(devices.size());
@@ -304,12 +289,18 @@ class PerfettoWriter::Impl {
   }
 
   void begin_body(const JobEvent &event, Live &job) {
-    const auto known = thread_of_.find(job_key(event.task, event.job));
-    if (known == thread_of_.end() || job.thread != 0) return;
-    job.thread = known->second;
+    if (!kernel_ || job.thread != 0) return;
+    const KernelThreads &threads = kernel_->threads();
+    const std::optional<int> thread = threads.thread_of(event.task, event.job);
+    if (!thread) return;
+    job.thread = *thread;
+    Track &track = threads_[*thread];
+    if (track == Track::None) {
+      track = writer_.add_thread(threads.name_of(*thread), threads.process_of(*thread), *thread);
+    }
     const TaskState &task = tasks_[event.task.value];
     const std::array arguments = {Argument(job_, std::int64_t{event.job})};
-    writer_.begin(threads_[job.thread], since_start(event.value), task.name, task.category, {.arguments = arguments});
+    writer_.begin(track, since_start(event.value), task.name, task.category, {.arguments = arguments});
   }
 
   // Begins an arrow to each successor of a task, from a job that finished now.
@@ -353,7 +344,8 @@ class PerfettoWriter::Impl {
 
   PacketWriter writer_;
   const trace::RunInfo &run_;
-  const KernelRecord *kernel_;
+  std::optional<perfetto::KernelDrawing> kernel_;
+  Result<void> kernel_read_;
   std::vector<TaskRef> refs_;
   DeadlineWatch watch_;
   Counters counters_;
@@ -362,7 +354,6 @@ class PerfettoWriter::Impl {
   std::vector<DagCounters> dags_;
   std::vector<TaskState> tasks_;
   std::unordered_map<std::uint32_t, Worker> workers_;
-  std::unordered_map<std::uint64_t, int> thread_of_;  // by job
   std::unordered_map<int, Track> threads_;
   ArgumentName job_ = ArgumentName::None;
   ArgumentName outcome_ = ArgumentName::None;
@@ -379,10 +370,16 @@ PerfettoWriter::PerfettoWriter(PerfettoWriter &&) noexcept = default;
 PerfettoWriter::~PerfettoWriter() = default;
 
 Result<PerfettoWriter> PerfettoWriter::create(const std::string &path, const trace::RunInfo &run,
-                                              const KernelRecord *kernel) {
+                                              const std::optional<KernelRecord> &kernel) {
+  std::optional<KernelReader> reader;
+  if (kernel) {
+    Result<KernelReader> begun = kernel->read();
+    if (!begun) return tl::unexpected<Diagnostics>(std::move(begun.error()));
+    reader = *std::move(begun);
+  }
   Result<trace::OutputFile> file = trace::OutputFile::create(path);
   if (!file) return tl::unexpected<Diagnostics>(std::move(file.error()));
-  return PerfettoWriter(std::make_unique<Impl>(std::move(*file), run, kernel));
+  return PerfettoWriter(std::make_unique<Impl>(std::move(*file), run, std::move(reader)));
 }
 
 void PerfettoWriter::add(std::span<const JobEvent> events) {
@@ -391,7 +388,8 @@ void PerfettoWriter::add(std::span<const JobEvent> events) {
 
 Result<void> PerfettoWriter::commit(Time end) { return impl_->commit(end); }
 
-Result<void> write_perfetto(const std::string &path, const trace::Trace &trace, const KernelRecord *kernel) {
+Result<void> write_perfetto(const std::string &path, const trace::Trace &trace,
+                            const std::optional<KernelRecord> &kernel) {
   Result<PerfettoWriter> writer = PerfettoWriter::create(path, trace.info, kernel);
   if (!writer) return tl::unexpected<Diagnostics>(std::move(writer.error()));
   writer->add(trace.events);

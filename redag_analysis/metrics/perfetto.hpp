@@ -18,9 +18,10 @@ namespace redag::metrics {
 
 class PerfettoWriter {
  public:
-  /// Opens the file. `run`, whose `end` is not used, and `kernel` must outlive this object. `kernel` may be null.
+  /// Opens the file. `run`, whose `end` is not used, must outlive this object. `kernel` is what the kernel recorded
+  /// meanwhile.
   [[nodiscard]] static Result<PerfettoWriter> create(const std::string &path, const trace::RunInfo &run,
-                                                     const KernelRecord *kernel = nullptr);
+                                                     const std::optional<KernelRecord> &kernel = std::nullopt);
   PerfettoWriter(PerfettoWriter &&) noexcept;
   PerfettoWriter &operator=(PerfettoWriter &&) = delete;
   PerfettoWriter(const PerfettoWriter &) = delete;
@@ -39,6 +40,6 @@ class PerfettoWriter {
 };
 
 [[nodiscard]] Result<void> write_perfetto(const std::string &path, const trace::Trace &trace,
-                                          const KernelRecord *kernel = nullptr);
+                                          const std::optional<KernelRecord> &kernel = std::nullopt);
 
 }  // namespace redag::metrics

@@ -7,168 +7,167 @@
 
 #include <algorithm>
 #include <array>
-#include <map>
-#include <vector>
+#include <span>
+#include <string_view>
+#include <utility>
 
 namespace redag::metrics::perfetto {
 namespace {
 
 constexpr std::size_t kBundle = 1000;  // events of a packet
-constexpr int kOrdinary = 120;         // the kernel's priority of a thread with nice value 0, and of the idle one
 constexpr std::string_view kSoft = "softirq ";
 // The kernel's numbers of its softirqs, by name (include/linux/interrupt.h).
 constexpr std::array<std::string_view, 10> kSoftirqs = {"HI",       "TIMER",   "NET_TX", "NET_RX",  "BLOCK",
                                                         "IRQ_POLL", "TASKLET", "SCHED",  "HRTIMER", "RCU"};
 
-/// An event of a processor: where it stands in the record, and when it happened.
-struct Place {
-  enum class Kind : std::uint8_t { Exit, Switch, Entry };  // in the order of those of one time
-
-  int cpu = 0;
-  Time time = 0;
-  Kind kind = Kind::Switch;
-  std::size_t index = 0;
-};
-
-// The events from `start` on, by processor and time. The last switch before `start` becomes one at `start`, because it
-// tells who had the processor then.
-std::vector<Place> places_of(const KernelRecord &record, Time start) {
-  std::vector<Place> places;
-  std::map<int, std::size_t> earlier;  // by processor
-  for (std::size_t i = 0; i < record.switches.size(); ++i) {
-    const KernelSwitch &one = record.switches[i];
-    if (one.time < start) {
-      earlier[one.cpu] = i;
-    } else {
-      places.push_back({one.cpu, one.time, Place::Kind::Switch, i});
-    }
-  }
-  for (const auto &[cpu, i] : earlier) places.push_back({cpu, start, Place::Kind::Switch, i});
-  for (std::size_t i = 0; i < record.interrupts.size(); ++i) {
-    const KernelInterrupt &one = record.interrupts[i];
-    if (one.end < start) continue;
-    places.push_back({one.cpu, std::max(one.begin, start), Place::Kind::Entry, i});
-    places.push_back({one.cpu, one.end, Place::Kind::Exit, i});
-  }
-  std::sort(places.begin(), places.end(), [](const Place &a, const Place &b) {
-    return std::tie(a.cpu, a.time, a.kind, a.index) < std::tie(b.cpu, b.time, b.kind, b.index);
-  });
-  return places;
-}
-
-class KernelEvents {
- public:
-  KernelEvents(PacketWriter &writer, const KernelRecord &record, Time start)
-      : writer_(writer), record_(record), start_(start) {}
-
-  // Writes events of one processor.
-  void write(std::span<const Place> places) {
-    writer_.packet([&](Builder<TracePacket> &packet) {
-      Builder<FtraceEventBundle> bundle(packet, TracePacket::FtraceEvents);
-      bundle.add_uint(FtraceEventBundle::Cpu, static_cast<std::uint32_t>(places.front().cpu));
-      for (const Place &place : places) {
-        Builder<FtraceEvent> event(bundle, FtraceEventBundle::Event);
-        event.add_uint(FtraceEvent::Timestamp, static_cast<std::uint64_t>(place.time - start_));
-        if (place.kind == Place::Kind::Switch) {
-          add_switch(event, record_.switches[place.index]);
-        } else {
-          event.add_uint(FtraceEvent::Pid, static_cast<std::uint32_t>(running_[place.cpu].thread));
-          add_interrupt(event, record_.interrupts[place.index].name, place.kind == Place::Kind::Entry);
-        }
-      }
-    });
-    writer_.flush_if_full();
-  }
-
- private:
-  struct Running {
-    int thread = 0;
-    int priority = kOrdinary;
-  };
-
-  [[nodiscard]] std::string comm(int thread, int cpu) const {
-    return thread == 0 ? fmt::format("swapper/{}", cpu) : thread_name(record_, thread);
-  }
-
-  void add_switch(Builder<FtraceEvent> &event, const KernelSwitch &one) {
-    Running &running = running_[one.cpu];
-    event.add_uint(FtraceEvent::Pid, static_cast<std::uint64_t>(one.from));
-    Builder<SchedSwitch> its(event, FtraceEvent::SchedSwitch);
-    its.add_text(SchedSwitch::PrevComm, comm(one.from, one.cpu));
-    its.add_int(SchedSwitch::PrevPid, one.from);
-    its.add_int(SchedSwitch::PrevPrio, running.thread == one.from ? running.priority : kOrdinary);
-    its.add_int(SchedSwitch::PrevState, one.runnable ? 0 : 1);  // TASK_RUNNING, TASK_INTERRUPTIBLE
-    its.add_text(SchedSwitch::NextComm, comm(one.to, one.cpu));
-    its.add_int(SchedSwitch::NextPid, one.to);
-    its.add_int(SchedSwitch::NextPrio, one.to_priority);
-    running = {one.to, one.to_priority};
-  }
-
-  void add_interrupt(Builder<FtraceEvent> &event, const std::string &name, bool begins) {
-    const std::string_view soft = std::string_view(name).substr(name.rfind(kSoft, 0) == 0 ? kSoft.size() : 0);
-    const auto vector = std::find(kSoftirqs.begin(), kSoftirqs.end(), soft);
-    if (soft.size() < name.size() && vector != kSoftirqs.end()) {
-      Builder<Softirq> its(event, begins ? FtraceEvent::SoftirqEntry : FtraceEvent::SoftirqExit);
-      its.add_uint(Softirq::Vec, static_cast<std::uint32_t>(vector - kSoftirqs.begin()));
-      return;
-    }
-    // The record has names of interrupts and no numbers. Numbers only have to differ.
-    const int number = numbers_.try_emplace(name, static_cast<int>(numbers_.size())).first->second;
-    if (begins) {
-      Builder<IrqHandlerEntry> its(event, FtraceEvent::IrqHandlerEntry);
-      its.add_int(IrqHandlerEntry::Irq, number);
-      its.add_text(IrqHandlerEntry::Name, name);
-    } else {
-      Builder<IrqHandlerExit> its(event, FtraceEvent::IrqHandlerExit);
-      its.add_int(IrqHandlerExit::Irq, number);
-      its.add_int(IrqHandlerExit::Ret, 1);  // handled
-    }
-  }
-
-  PacketWriter &writer_;
-  const KernelRecord &record_;
-  Time start_;
-  std::map<int, Running> running_;  // by processor
-  std::map<std::string, int> numbers_;
-};
-
-void write_processes(PacketWriter &writer, const KernelRecord &record, const std::string &program) {
-  const int process = process_of(record);
-  if (process == 0) return;
-  writer.packet([&](Builder<TracePacket> &packet) {
-    Builder<ProcessTree> tree(packet, TracePacket::ProcessTree);
-    {
-      Builder<Process> its(tree, ProcessTree::Processes);
-      its.add_int(Process::Pid, process);
-      its.add_text(Process::Cmdline, program);
-    }
-    for (const int thread : record.own) {
-      Builder<Thread> its(tree, ProcessTree::Threads);
-      its.add_int(Thread::Tid, thread);
-      its.add_int(Thread::Tgid, process);
-      its.add_text(Thread::Name, thread_name(record, thread));
-    }
-  });
-}
-
 }  // namespace
 
-int process_of(const KernelRecord &record) { return record.own.empty() ? 0 : *record.own.begin(); }
-
-std::string thread_name(const KernelRecord &record, int thread) {
-  const auto known = record.names.find(thread);
-  return known == record.names.end() ? fmt::format("thread {}", thread) : known->second;
+Result<void> KernelDrawing::read_until(Time time) {
+  while (!is_over_ && last_ <= time) {
+    const Result<std::optional<KernelRow>> row = reader_.next();
+    if (!row) return tl::unexpected<Diagnostics>(row.error());
+    if (!*row) {
+      is_over_ = true;
+      break;
+    }
+    add(**row);
+    if (const std::optional<Time> at = time_of(**row)) last_ = *at;
+  }
+  return {};
 }
 
-void write_kernel(PacketWriter &writer, const KernelRecord &record, Time start, const std::string &program) {
-  write_processes(writer, record, program);
-  const std::vector<Place> places = places_of(record, start);
-  KernelEvents events(writer, record, start);
-  for (std::size_t from = 0; from < places.size();) {
-    std::size_t to = from;
-    while (to < places.size() && to - from < kBundle && places[to].cpu == places[from].cpu) ++to;
-    events.write(std::span(places).subspan(from, to - from));
-    from = to;
+Result<void> KernelDrawing::finish() {
+  if (Result<void> read = read_until(kNever); !read) return read;
+  begin();
+  for (auto &[cpu, events] : events_) {
+    while (!events.empty()) write(cpu, events, kBundle);
+  }
+  return {};
+}
+
+void KernelDrawing::add(const KernelRow &row) {
+  threads_.add(row);
+  if (const auto *event = std::get_if<KernelSwitch>(&row)) {
+    add(*event);
+  } else if (const auto *interrupt = std::get_if<KernelInterrupt>(&row)) {
+    add(*interrupt);
+  } else if (const auto *process = std::get_if<KernelProcess>(&row)) {
+    write_process(*process);
+  } else if (const auto *thread = std::get_if<KernelThread>(&row); thread != nullptr && thread->process != 0) {
+    write_thread(*thread);
+  }
+}
+
+void KernelDrawing::add(const KernelSwitch &event) {
+  if (event.time < start_) {
+    earlier_[event.cpu] = event;
+    return;
+  }
+  begin();
+  push(event.cpu, {event.time, 1, Event::Kind::Switch, event});
+}
+
+void KernelDrawing::add(const KernelInterrupt &event) {
+  if (event.end < start_) return;
+  begin();
+  const Time entry = std::max(event.begin, start_);
+  // One interrupt can end, and the next one begin, in the same microsecond, and so can both ends of a short one.
+  push(event.cpu, {entry, entry < event.end ? 2 : 0, Event::Kind::Entry, event.name});
+  push(event.cpu, {event.end, 0, Event::Kind::Exit, event.name});
+}
+
+void KernelDrawing::push(int cpu, Event event) {
+  std::vector<Event> &events = events_[cpu];
+  events.push_back(std::move(event));
+  // The record has an interrupt where it ends. Half of the events wait for those that began before them.
+  if (events.size() >= 2 * kBundle) write(cpu, events, kBundle);
+}
+
+// The last switch before `start` becomes one at `start`, because it tells who had the processor then.
+void KernelDrawing::begin() {
+  if (std::exchange(has_begun_, true)) return;
+  for (const auto &[cpu, event] : earlier_) push(cpu, {start_, 1, Event::Kind::Switch, event});
+}
+
+// Writes the earliest events of one processor.
+void KernelDrawing::write(int cpu, std::vector<Event> &events, std::size_t most) {
+  std::stable_sort(events.begin(), events.end(), [](const Event &a, const Event &b) {
+    return std::pair(a.time, a.order) < std::pair(b.time, b.order);
+  });
+  const std::size_t count = std::min(most, events.size());
+  writer_.packet([&](Builder<TracePacket> &packet) {
+    Builder<FtraceEventBundle> bundle(packet, TracePacket::FtraceEvents);
+    bundle.add_uint(FtraceEventBundle::Cpu, static_cast<std::uint32_t>(cpu));
+    for (const Event &one : std::span(events).first(count)) {
+      Builder<FtraceEvent> event(bundle, FtraceEventBundle::Event);
+      event.add_uint(FtraceEvent::Timestamp, static_cast<std::uint64_t>(one.time - start_));
+      if (const auto *its = std::get_if<KernelSwitch>(&one.what)) {
+        write_switch(event, *its);
+      } else {
+        event.add_uint(FtraceEvent::Pid, static_cast<std::uint32_t>(running_[cpu].thread));
+        write_interrupt(event, std::get<std::string>(one.what), one.kind == Event::Kind::Entry);
+      }
+    }
+  });
+  writer_.flush_if_full();
+  events.erase(events.begin(), events.begin() + static_cast<std::ptrdiff_t>(count));
+}
+
+void KernelDrawing::write_process(const KernelProcess &process) {
+  writer_.packet([&](Builder<TracePacket> &packet) {
+    Builder<ProcessTree> tree(packet, TracePacket::ProcessTree);
+    Builder<Process> its(tree, ProcessTree::Processes);
+    its.add_int(Process::Pid, process.process);
+    its.add_text(Process::Cmdline, process.name);
+  });
+}
+
+void KernelDrawing::write_thread(const KernelThread &thread) {
+  writer_.packet([&](Builder<TracePacket> &packet) {
+    Builder<ProcessTree> tree(packet, TracePacket::ProcessTree);
+    Builder<Thread> its(tree, ProcessTree::Threads);
+    its.add_int(Thread::Tid, thread.thread);
+    its.add_int(Thread::Tgid, thread.process);
+    its.add_text(Thread::Name, thread.name);
+  });
+}
+
+std::string KernelDrawing::comm(int thread, int cpu) const {
+  return thread == 0 ? fmt::format("swapper/{}", cpu) : threads_.name_of(thread);
+}
+
+void KernelDrawing::write_switch(Builder<FtraceEvent> &event, const KernelSwitch &one) {
+  Running &running = running_[one.cpu];
+  event.add_uint(FtraceEvent::Pid, static_cast<std::uint64_t>(one.from));
+  Builder<SchedSwitch> its(event, FtraceEvent::SchedSwitch);
+  its.add_text(SchedSwitch::PrevComm, comm(one.from, one.cpu));
+  its.add_int(SchedSwitch::PrevPid, one.from);
+  its.add_int(SchedSwitch::PrevPrio, running.thread == one.from ? running.priority : kOrdinary);
+  its.add_int(SchedSwitch::PrevState, one.runnable ? 0 : 1);  // TASK_RUNNING, TASK_INTERRUPTIBLE
+  its.add_text(SchedSwitch::NextComm, comm(one.to, one.cpu));
+  its.add_int(SchedSwitch::NextPid, one.to);
+  its.add_int(SchedSwitch::NextPrio, one.to_priority);
+  running = {one.to, one.to_priority};
+}
+
+void KernelDrawing::write_interrupt(Builder<FtraceEvent> &event, const std::string &name, bool begins) {
+  const std::string_view soft = std::string_view(name).substr(name.rfind(kSoft, 0) == 0 ? kSoft.size() : 0);
+  const auto vector = std::find(kSoftirqs.begin(), kSoftirqs.end(), soft);
+  if (soft.size() < name.size() && vector != kSoftirqs.end()) {
+    Builder<Softirq> its(event, begins ? FtraceEvent::SoftirqEntry : FtraceEvent::SoftirqExit);
+    its.add_uint(Softirq::Vec, static_cast<std::uint32_t>(vector - kSoftirqs.begin()));
+    return;
+  }
+  // The record has names of interrupts and no numbers. Numbers only have to differ.
+  const int number = interrupt_numbers_.try_emplace(name, static_cast<int>(interrupt_numbers_.size())).first->second;
+  if (begins) {
+    Builder<IrqHandlerEntry> its(event, FtraceEvent::IrqHandlerEntry);
+    its.add_int(IrqHandlerEntry::Irq, number);
+    its.add_text(IrqHandlerEntry::Name, name);
+  } else {
+    Builder<IrqHandlerExit> its(event, FtraceEvent::IrqHandlerExit);
+    its.add_int(IrqHandlerExit::Irq, number);
+    its.add_int(IrqHandlerExit::Ret, 1);  // handled
   }
 }
 

@@ -16,6 +16,7 @@
 #include "redag_analysis/metrics/jobs.hpp"
 #include "redag_analysis/metrics/protobuf.hpp"
 #include "redag_testing/builders.hpp"
+#include "redag_testing/kernel_rows.hpp"
 #include "redag_testing/perfetto_reader.hpp"
 #include "redag_testing/random_workloads.hpp"
 #include "redag_testing/timeline.hpp"
@@ -37,7 +38,7 @@ class Perfetto : public ::testing::Test {
  protected:
   ~Perfetto() override { std::filesystem::remove(path_); }
 
-  Picture picture_of(const trace::Trace &trace, const KernelRecord *kernel = nullptr) {
+  Picture picture_of(const trace::Trace &trace, const std::optional<KernelRecord> &kernel = std::nullopt) {
     const Result<void> written = write_perfetto(path_, trace, kernel);
     EXPECT_TRUE(written) << to_string(written.error());
     return testing::read_picture(path_);
@@ -207,18 +208,20 @@ TEST_F(Perfetto, TheKernelsRecordIsOnTheSameClock) {
   workload.name = "robot";
   TraceBuilder t(std::move(workload));
   t.at(0).arrives("a", 0).dispatched("a", 0, 0, 10).started("a", 0, 0).at(4).finished("a", 0, 0);
-  KernelRecord kernel;
-  kernel.names = {{100, "main"}, {101, "redag-0"}, {7, "rcu-7"}};
-  kernel.own = {100, 101};
-  kernel.jobs = {{TaskId(0), 0, 101}};
-  kernel.switches = {{-9 * kMs, 1, 0, true, 7, 120},
-                     {-5 * kMs, 1, 7, false, 101, 40},
-                     {kMs, 1, 101, true, 7, 120},
-                     {2 * kMs, 1, 7, false, 101, 40},
-                     {4 * kMs, 1, 101, false, 0, 120}};
-  kernel.interrupts = {
-      {-3 * kMs, -2 * kMs, 1, "eth0"}, {-kMs, kMs / 2, 1, "eth0"}, {3 * kMs, 3 * kMs + 10, 1, "softirq TIMER"}};
-  const Picture picture = picture_of(t.until(10), &kernel);
+  const std::vector<KernelRow> rows = {KernelProcess{100, "robot"},
+                                       KernelThread{100, "main", 100},
+                                       KernelThread{101, "redag-0", 100},
+                                       KernelThread{7, "rcu-7", 0},
+                                       JobThread{TaskId(0), 0, 101},
+                                       KernelSwitch{-9 * kMs, 1, 0, true, 7, 120},
+                                       KernelSwitch{-5 * kMs, 1, 7, false, 101, 40},
+                                       KernelInterrupt{-3 * kMs, -2 * kMs, 1, "eth0"},
+                                       KernelInterrupt{-kMs, kMs / 2, 1, "eth0"},
+                                       KernelSwitch{kMs, 1, 101, true, 7, 120},
+                                       KernelSwitch{2 * kMs, 1, 7, false, 101, 40},
+                                       KernelInterrupt{3 * kMs, 3 * kMs, 1, "softirq TIMER"},
+                                       KernelSwitch{4 * kMs, 1, 101, false, 0, 120}};
+  const Picture picture = picture_of(t.until(10), testing::kernel_record_of(rows));
   std::vector<std::string> events;
   for (const testing::PictureKernelEvent &one : picture.kernel) {
     std::string line = std::to_string(one.time / kMs) + " " + one.kind;
@@ -234,6 +237,20 @@ TEST_F(Perfetto, TheKernelsRecordIsOnTheSameClock) {
   EXPECT_EQ(picture.processes.at(100), "robot");
   EXPECT_EQ(picture.threads.at(101), "redag-0");
   EXPECT_THAT(texts(picture.slices_of("thread 101")), ElementsAre("a 0-4 job=0"));
+}
+
+// More events than a packet has, with interrupts that the record has after what happened meanwhile.
+TEST_F(Perfetto, TheKernelsEventsOfAProcessorAreInOrder) {
+  TraceBuilder t(make_workload({make_dag("d", {{"a", 10, 3}})}, 1, PreemptionMode::Os));
+  std::vector<KernelRow> rows;
+  for (Time at = 0; at < 5000; ++at) {
+    rows.emplace_back(KernelSwitch{.time = at, .cpu = 0, .from = 1, .to = 2});
+    if (at % 10 == 9) rows.emplace_back(KernelInterrupt{at - 5, at, 0, "eth0"});
+  }
+  const Picture picture = picture_of(t.until(10), testing::kernel_record_of(rows));
+  EXPECT_EQ(picture.kernel.size(), 6000U);
+  EXPECT_TRUE(std::is_sorted(picture.kernel.begin(), picture.kernel.end(),
+                             [](const auto &a, const auto &b) { return a.time < b.time; }));
 }
 
 TEST_F(Perfetto, LongRunsAreWrittenInBlocks) {

@@ -187,9 +187,15 @@ class Investigation::Explainer {
   Explainer(const Investigation &of, std::span<const Subject> subjects, const Visit &visit)
       : of_(of), subjects_(subjects), visit_(visit) {}
 
-  Result<void> run() {
-    if (Result<void> chosen = choose(); !chosen) return chosen;
-    return follow();
+  Result<std::uint64_t> run() {
+    if (of_.kernel_) {
+      Result<KernelReader> reader = of_.kernel_->read();
+      if (!reader) return tl::unexpected<Diagnostics>(std::move(reader.error()));
+      kernel_.emplace(*std::move(reader));
+    }
+    if (Result<void> chosen = choose(); !chosen) return tl::unexpected<Diagnostics>(std::move(chosen.error()));
+    if (Result<void> followed = follow(); !followed) return tl::unexpected<Diagnostics>(std::move(followed.error()));
+    return kernel_ ? kernel_->lost() : 0;
   }
 
  private:
@@ -230,13 +236,20 @@ class Investigation::Explainer {
             visit_(index, explain(*subject, subjects_[index].end_to_end, links));
           });
     };
+    Result<void> kernel;
+    const auto read_kernel = [&](Time time) {
+      if (kernel_ && kernel) kernel = kernel_->read_until(time);
+    };
     Result<void> read = of_.run_.visit([&](std::span<const JobEvent> events) {
       for (const JobEvent &event : events) watch.add(event, links);
+      if (!events.empty()) read_kernel(events.back().time);
       settle();
     });
+    read_kernel(of_.run().end);
     watch.finish(links);
     settle();
-    return read;
+    read_kernel(kNever);  // an incomplete record is no good one
+    return read ? kernel : read;
   }
 
   [[nodiscard]] Explanation explain(const LinkedJob &job, bool end_to_end, const JobLinks &links) const {
@@ -247,8 +260,8 @@ class Investigation::Explainer {
     one.begin = one.end_to_end ? job.record.origin : job.record.release;
     one.end = std::max(one.begin, links.end_of(job));
     one.deadline = one.end_to_end ? of_.end_to_end_[job.record.task.value] : job.record.deadline - job.record.release;
-    one.parts = WhyPath(of_.run(), links, of_.kernel_ ? &*of_.kernel_ : nullptr)
-                    .parts_of(job, one.begin, one.end, one.end_to_end);
+    one.parts =
+        WhyPath(of_.run(), links, kernel_ ? &*kernel_ : nullptr).parts_of(job, one.begin, one.end, one.end_to_end);
     return one;
   }
 
@@ -256,14 +269,14 @@ class Investigation::Explainer {
   std::span<const Subject> subjects_;
   const Visit &visit_;
   std::unordered_set<std::uint64_t> chosen_;
+  std::optional<KernelView> kernel_;
 };
 
-Investigation::Investigation(const trace::Recording &run, const KernelRecord *kernel)
-    : run_(run), end_to_end_(end_to_end_deadlines(run.info().workload)) {
-  if (kernel != nullptr) kernel_.emplace(*kernel);
-}
+Investigation::Investigation(const trace::Recording &run, const std::optional<KernelRecord> &kernel)
+    : run_(run), end_to_end_(end_to_end_deadlines(run.info().workload)), kernel_(kernel) {}
 
-Result<Investigation> Investigation::of(const trace::Recording &run, const KernelRecord *kernel, std::size_t most) {
+Result<Investigation> Investigation::of(const trace::Recording &run, const std::optional<KernelRecord> &kernel,
+                                        std::size_t most) {
   Investigation made(run, kernel);
   Surveyor surveyor(made, most);
   const Result<void> read = run.visit([&](std::span<const JobEvent> events) { surveyor.add(events); });
@@ -315,13 +328,14 @@ Result<std::optional<Subject>> Investigation::find(const JobId &job) const {
   return found;
 }
 
-Result<void> Investigation::explain(std::span<const Subject> subjects, const Visit &visit) const {
+Result<std::uint64_t> Investigation::explain(std::span<const Subject> subjects, const Visit &visit) const {
   return Explainer(*this, subjects, visit).run();
 }
 
 Result<std::vector<Explanation>> Investigation::explain(std::span<const Subject> subjects) const {
   std::vector<Explanation> all(subjects.size());
-  const Result<void> read = explain(subjects, [&](std::size_t index, Explanation one) { all[index] = std::move(one); });
+  const Result<std::uint64_t> read =
+      explain(subjects, [&](std::size_t index, Explanation one) { all[index] = std::move(one); });
   if (!read) return tl::unexpected<Diagnostics>(read.error());
   return all;
 }

@@ -79,9 +79,10 @@ class Investigation {
   /// Takes an explanation, and the index of its subject.
   using Visit = std::function<void(std::size_t, Explanation)>;
 
-  /// Reads the run once. Keeps up to `most` of its misses, the worst ones. What `run` refers to and `kernel` (null:
-  /// there is none) must outlive the result. Error: a damaged file.
-  [[nodiscard]] static Result<Investigation> of(const trace::Recording &run, const KernelRecord *kernel = nullptr,
+  /// Reads the run once. Keeps up to `most` of its misses, the worst ones. What `run` refers to must outlive the
+  /// result. `kernel` is what the kernel recorded meanwhile. Error: a damaged file.
+  [[nodiscard]] static Result<Investigation> of(const trace::Recording &run,
+                                                const std::optional<KernelRecord> &kernel = std::nullopt,
                                                 std::size_t most = std::numeric_limits<std::size_t>::max());
 
   [[nodiscard]] const trace::RunInfo &run() const { return run_.info(); }
@@ -102,8 +103,9 @@ class Investigation {
   /// The largest number of a job of the task.
   [[nodiscard]] std::uint32_t last_number(TaskId task) const { return survey_.tasks[task.value].last_number; }
 
-  /// Explains jobs, each named once, in two passes. They come in order of their end. Error: a damaged file.
-  [[nodiscard]] Result<void> explain(std::span<const Subject> subjects, const Visit &visit) const;
+  /// Explains jobs, each named once, in two passes. They come in order of their end. Returns how many of its events the
+  /// kernel dropped, so that explanations can be wrong. Error: a damaged file.
+  [[nodiscard]] Result<std::uint64_t> explain(std::span<const Subject> subjects, const Visit &visit) const;
   /// The same, in the order of `subjects`.
   [[nodiscard]] Result<std::vector<Explanation>> explain(std::span<const Subject> subjects) const;
 
@@ -128,13 +130,13 @@ class Investigation {
   class Surveyor;
   class Explainer;
 
-  Investigation(const trace::Recording &run, const KernelRecord *kernel);
+  Investigation(const trace::Recording &run, const std::optional<KernelRecord> &kernel);
   static bool is_worse(const Ranked &a, const Ranked &b);
   [[nodiscard]] Miss miss_of(const JobRecord &job) const;
 
   trace::Recording run_;
   std::vector<Duration> end_to_end_;  // by TaskId: the deadline; 0: none
-  std::optional<KernelView> kernel_;
+  std::optional<KernelRecord> kernel_;
   Survey survey_;
 };
 

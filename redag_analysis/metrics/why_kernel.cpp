@@ -4,6 +4,8 @@
 #include "redag_analysis/metrics/why_kernel.hpp"
 
 #include <algorithm>
+#include <iterator>
+#include <variant>
 
 namespace redag::metrics {
 namespace {
@@ -21,43 +23,92 @@ void push(std::vector<KernelView::Stretch> &out, Cause cause, std::string progra
 
 }  // namespace
 
-KernelView::KernelView(const KernelRecord &record) : record_(record) {
-  for (const JobThread &job : record.jobs) jobs_.emplace(JobId{job.task, job.number}, job.thread);
-  std::map<int, KernelSwitch> current;  // by processor: what began
-  for (const KernelSwitch &event : record.switches) {
-    if (const auto before = current.find(event.cpu); before != current.end() && before->second.to == event.from) {
-      const KernelSwitch &began = before->second;
-      by_cpu_[event.cpu].push_back({began.time, event.time, event.cpu, began.to, began.to_priority, event.runnable});
+Result<void> KernelView::read_until(Time time) {
+  // Times of the kernel are whole microseconds, and a job is logged a moment after its body began.
+  constexpr Duration kBeyond = kMillisecond;
+  const Time until = time > kNever - kBeyond ? kNever : time + kBeyond;
+  while (!is_over_ && last_ <= until) {
+    const Result<std::optional<KernelRow>> row = reader_.next();
+    if (!row) return tl::unexpected<Diagnostics>(row.error());
+    if (!*row) {
+      end();
+      break;
     }
-    current[event.cpu] = event;
+    if (const auto *one = std::get_if<KernelSwitch>(&**row)) {
+      add(*one);
+    } else if (const auto *interrupt = std::get_if<KernelInterrupt>(&**row)) {
+      interrupts_[interrupt->cpu].push_back(*interrupt);
+      ++kept_;
+    } else if (const auto *loss = std::get_if<KernelLoss>(&**row)) {
+      lost_ += loss->events;
+    } else {
+      threads_.add(**row);
+    }
+    if (const std::optional<Time> at = time_of(**row)) {
+      last_ = *at;
+      if (!first_) first_ = at;
+    }
+    if (kept_ > kMostKept) forget();
   }
-  for (const auto &[cpu, slices] : by_cpu_) {
-    for (const Slice &slice : slices) by_thread_[slice.thread].push_back(slice);
-  }
-  for (auto &[thread, slices] : by_thread_) {
-    std::sort(slices.begin(), slices.end(), [](const Slice &a, const Slice &b) { return a.begin < b.begin; });
-  }
-  for (const KernelInterrupt &interrupt : record.interrupts) interrupts_[interrupt.cpu].push_back(&interrupt);
+  return {};
 }
 
-std::optional<int> KernelView::thread_of(const JobId &job) const {
-  const auto found = jobs_.find(job);
-  return found == jobs_.end() ? std::nullopt : std::optional(found->second);
+void KernelView::add(const KernelSwitch &event) {
+  Slices &slices = by_cpu_[event.cpu];
+  if (!slices.empty() && slices.back().end == kNever) {
+    const bool is_whole = slices.back().thread == event.from;  // else the kernel dropped the end of this slice
+    if (const auto own = by_thread_.find(slices.back().thread); own != by_thread_.end()) {
+      end_last(own->second, event, is_whole);
+    }
+    end_last(slices, event, is_whole);
+  }
+  slices.push_back({.begin = event.time, .cpu = event.cpu, .thread = event.to, .priority = event.to_priority});
+  ++kept_;
+  if (threads_.process_of(event.to) == 0) return;
+  by_thread_[event.to].push_back(slices.back());
+  ++kept_;
 }
 
-std::vector<int> KernelView::threads_named(const std::string &name) const {
-  std::vector<int> threads;
-  for (const int thread : record_.own) {
-    if (const auto found = record_.names.find(thread); found != record_.names.end() && found->second == name) {
-      threads.push_back(thread);
+// Ends the slice that goes on on the processor of `event`, or removes it.
+void KernelView::end_last(Slices &slices, const KernelSwitch &event, bool is_whole) {
+  const auto open = std::find_if(slices.rbegin(), slices.rend(),
+                                 [&](const Slice &slice) { return slice.cpu == event.cpu && slice.end == kNever; });
+  if (open == slices.rend()) return;
+  open->end = event.time;
+  open->runnable = event.runnable;
+  if (!is_whole) slices.erase(std::next(open).base());
+}
+
+// Slices go on as far as the record does.
+void KernelView::end() {
+  is_over_ = true;
+  for (auto *all : {&by_cpu_, &by_thread_}) {
+    for (auto &[key, slices] : *all) {
+      for (Slice &slice : slices) slice.end = std::min(slice.end, last_);
     }
   }
-  return threads;
 }
 
-std::string KernelView::name_of(int thread) const {
-  const auto found = record_.names.find(thread);
-  return found == record_.names.end() ? "thread " + std::to_string(thread) : found->second;
+// Forgets the older half of the time that is kept.
+void KernelView::forget() {
+  const Time middle = *first_ + (last_ - *first_) / 2;
+  const auto trim = [&](auto &all) {
+    for (auto &[key, kept] : all) {
+      while (!kept.empty() && kept.front().end < middle) {
+        kept.pop_front();
+        --kept_;
+      }
+    }
+  };
+  trim(by_cpu_);
+  trim(by_thread_);
+  trim(interrupts_);
+  first_ = middle;
+}
+
+std::optional<int> KernelView::thread_beside(const JobId &job, const std::string &name) const {
+  const std::optional<int> thread = thread_of(job);
+  return threads_.thread_named(name, thread ? threads_.process_of(*thread) : 0);
 }
 
 std::vector<KernelView::Stretch> KernelView::follow(int thread, Time begin, Time end) const {
@@ -67,7 +118,7 @@ std::vector<KernelView::Stretch> KernelView::follow(int thread, Time begin, Time
     push(out, Cause::Unknown, {}, begin, end);
     return out;
   }
-  const std::vector<Slice> &slices = found->second;
+  const Slices &slices = found->second;
   auto slice = first_after(slices, begin);
   Time at = begin;
   while (at < end) {
@@ -93,7 +144,7 @@ std::vector<KernelView::Stretch> KernelView::follow(int thread, Time begin, Time
 std::vector<KernelView::Stretch> KernelView::before(int thread, Time begin, Time end) const {
   std::vector<Stretch> out;
   const auto found = by_thread_.find(thread);
-  if (found == by_thread_.end() || found->second.front().begin > end) {
+  if (found == by_thread_.end() || found->second.empty() || found->second.front().begin > end) {
     push(out, Cause::Unknown, {}, begin, end);
     return out;
   }
@@ -120,11 +171,11 @@ void KernelView::occupants(int cpu, int priority, Time begin, Time end, std::vec
       const Time from = std::max(at, slice->begin);
       const Time to = std::min(end, slice->end);
       const bool throttled = is_realtime_priority(priority) && !is_realtime_priority(slice->priority);
-      const Cause cause = slice->thread == 0                    ? Cause::Unknown
-                          : record_.own.contains(slice->thread) ? Cause::OwnThread
-                          : throttled                           ? Cause::Throttled
-                                                                : Cause::OtherProgram;
-      push(out, cause, cause == Cause::Unknown ? std::string() : name_of(slice->thread), from, to);
+      const Cause cause = slice->thread == 0                        ? Cause::Unknown
+                          : threads_.process_of(slice->thread) != 0 ? Cause::OwnThread
+                          : throttled                               ? Cause::Throttled
+                                                                    : Cause::OtherProgram;
+      push(out, cause, cause == Cause::Unknown ? std::string() : threads_.name_of(slice->thread), from, to);
       at = std::max(at, to);
     }
   }
@@ -136,13 +187,11 @@ void KernelView::executed(const Slice &slice, Time begin, Time end, std::vector<
   Time at = begin;
   if (const auto found = interrupts_.find(slice.cpu); found != interrupts_.end()) {
     const auto &all = found->second;
-    auto one = std::upper_bound(all.begin(), all.end(), begin,
-                                [](Time value, const KernelInterrupt *interrupt) { return value < interrupt->end; });
-    for (; one != all.end() && (*one)->begin < end; ++one) {
-      const Time from = std::max(at, (*one)->begin);
-      const Time to = std::min(end, (*one)->end);
+    for (auto one = first_after(all, begin); one != all.end() && one->begin < end; ++one) {
+      const Time from = std::max(at, one->begin);
+      const Time to = std::min(end, one->end);
       push(out, Cause::Execution, {}, at, from);
-      push(out, Cause::Interrupt, (*one)->name, from, to);
+      push(out, Cause::Interrupt, one->name, from, to);
       at = std::max(at, to);
     }
   }

@@ -1,16 +1,20 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Looks up in the kernel's record what ran instead of a thread, and why. Internal to metrics/. Pure after construction.
+// Looks up in the kernel's record what ran instead of a thread, and why. Reads the record as far as its caller has read
+// the run, and forgets the oldest parts, so that memory does not grow with the run. Internal to metrics/.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <deque>
 #include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "redag_analysis/metrics/kernel_record.hpp"
+#include "redag_analysis/metrics/kernel_threads.hpp"
 #include "redag_analysis/metrics/why_cause.hpp"
 
 namespace redag::metrics {
@@ -25,11 +29,21 @@ class KernelView {
     Time end = 0;
   };
 
-  /// `record` must outlive this object.
-  explicit KernelView(const KernelRecord &record);
+  explicit KernelView(KernelReader reader) : reader_(std::move(reader)) {}
+
+  /// Reads on, a little beyond `time`. The other functions know what happened until then. Error: a damaged file.
+  [[nodiscard]] Result<void> read_until(Time time);
+
+  /// How many events the kernel dropped, as far as the record was read.
+  [[nodiscard]] std::uint64_t lost() const { return lost_; }
 
   /// The thread that ran a job's body, if it was recorded.
-  [[nodiscard]] std::optional<int> thread_of(const JobId &job) const;
+  [[nodiscard]] std::optional<int> thread_of(const JobId &job) const {
+    return threads_.thread_of(job.task, job.number);
+  }
+
+  /// The thread with this name in the process that ran the job, if it is the only one.
+  [[nodiscard]] std::optional<int> thread_beside(const JobId &job, const std::string &name) const;
 
   /// Returns what the thread did in [begin, end), without gaps.
   [[nodiscard]] std::vector<Stretch> follow(int thread, Time begin, Time end) const;
@@ -38,28 +52,37 @@ class KernelView {
   /// it was to begin there. Stretches in which nothing of another program ran are Cause::Unknown.
   [[nodiscard]] std::vector<Stretch> before(int thread, Time begin, Time end) const;
 
-  /// The threads of the process with this name.
-  [[nodiscard]] std::vector<int> threads_named(const std::string &name) const;
+  /// The most slices and interrupts that are kept, at about 40 bytes each.
+  static constexpr std::size_t kMostKept = std::size_t{1} << 21U;
 
  private:
   struct Slice {  // a thread on a processor
     Time begin = 0;
-    Time end = 0;
+    Time end = kNever;  // kNever: it goes on
     int cpu = 0;
     int thread = 0;
     int priority = 0;
     bool runnable = false;  // at its end
   };
+  using Slices = std::deque<Slice>;
 
+  void add(const KernelSwitch &event);
+  static void end_last(Slices &slices, const KernelSwitch &event, bool is_whole);
+  void end();
+  void forget();
   void occupants(int cpu, int priority, Time begin, Time end, std::vector<Stretch> &out) const;
   void executed(const Slice &slice, Time begin, Time end, std::vector<Stretch> &out) const;
-  [[nodiscard]] std::string name_of(int thread) const;
 
-  const KernelRecord &record_;
-  std::map<JobId, int> jobs_;
-  std::map<int, std::vector<Slice>> by_cpu_;
-  std::map<int, std::vector<Slice>> by_thread_;
-  std::map<int, std::vector<const KernelInterrupt *>> interrupts_;
+  KernelReader reader_;
+  KernelThreads threads_;
+  std::map<int, Slices> by_cpu_;
+  std::map<int, Slices> by_thread_;  // those of processes that ran jobs
+  std::map<int, std::deque<KernelInterrupt>> interrupts_;
+  std::optional<Time> first_;  // the earliest time that is kept
+  Time last_ = 0;              // of the last row with a time
+  std::size_t kept_ = 0;
+  std::uint64_t lost_ = 0;
+  bool is_over_ = false;
 };
 
 }  // namespace redag::metrics

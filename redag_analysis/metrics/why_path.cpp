@@ -141,12 +141,12 @@ void WhyPath::late_release(const LinkedJob &job, Time begin, Time end) {
     add(job, {Cause::HandOver, {}, begin, end}, begin, end);
     return;
   }
-  const std::vector<int> timers = kernel_ == nullptr ? std::vector<int>{} : kernel_->threads_named(kTimerThread);
-  if (timers.size() != 1) {
+  const std::optional<int> timer = kernel_ == nullptr ? std::nullopt : kernel_->thread_beside(job.id(), kTimerThread);
+  if (!timer) {
     add(job, {Cause::ReleaseLate, {}, begin, end}, begin, end);
     return;
   }
-  for (Stretch stretch : kernel_->before(timers.front(), record.release, record.seen)) {
+  for (Stretch stretch : kernel_->before(*timer, record.release, record.seen)) {
     if (stretch.cause == Cause::Unknown) stretch.cause = Cause::ReleaseLate;
     add(job, stretch, begin, end);
   }

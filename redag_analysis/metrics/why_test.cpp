@@ -15,6 +15,7 @@
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/why_text.hpp"
 #include "redag_testing/builders.hpp"
+#include "redag_testing/kernel_rows.hpp"
 #include "redag_testing/random_workloads.hpp"
 #include "redag_testing/timeline.hpp"
 #include "redag_testing/trace_builder.hpp"
@@ -338,30 +339,34 @@ TEST(Why, WithoutProcessorTimeItIsUnknownWhetherAJobExecuted) {
 
 // The record of job d.a#0 on thread 10: preempted by thread 77 from 5 to 7 ms, an interrupt at 8 ms, asleep from 10
 // to 11.
-KernelRecord kernel_record(int priority = 50) {
-  KernelRecord record;
+std::vector<KernelRow> kernel_rows(int priority = 50) {
   const auto at = [](Time ms) { return ms * kMillisecond; };
-  record.jobs = {{TaskId(0), 0, 10}};
-  record.names = {{10, "redag-0"}, {11, "redag-timer"}, {77, "stress-77"}};
-  record.own = {10, 11};
-  record.switches = {{at(-5), 0, 0, false, 77, 120}, {at(1) - 500'000, 0, 77, true, 11, 48},
-                     {at(1), 0, 11, false, 77, 120}, {at(2) + 500'000, 0, 77, true, 10, priority},
-                     {at(5), 0, 10, true, 77, 120},  {at(7), 0, 77, true, 10, priority},
-                     {at(10), 0, 10, false, 0, 120}, {at(11), 0, 0, false, 10, priority},
-                     {at(20), 0, 10, false, 0, 120}};
-  record.interrupts = {{at(8), at(8) + 1000, 0, "eth0"}};
-  return record;
+  return {KernelProcess{10, "robot"},
+          KernelThread{10, "redag-0", 10},
+          KernelThread{11, "redag-timer", 10},
+          KernelThread{77, "stress-77", 0},
+          JobThread{TaskId(0), 0, 10},
+          KernelSwitch{at(-5), 0, 0, false, 77, 120},
+          KernelSwitch{at(1) - 500'000, 0, 77, true, 11, 48},
+          KernelSwitch{at(1), 0, 11, false, 77, 120},
+          KernelSwitch{at(2) + 500'000, 0, 77, true, 10, priority},
+          KernelSwitch{at(5), 0, 10, true, 77, 120},
+          KernelSwitch{at(7), 0, 77, true, 10, priority},
+          KernelInterrupt{at(8), at(8) + 1000, 0, "eth0"},
+          KernelSwitch{at(10), 0, 10, false, 0, 120},
+          KernelSwitch{at(11), 0, 0, false, 10, priority},
+          KernelSwitch{at(20), 0, 10, false, 0, 120}};
 }
 
 TEST(Why, TheKernelsRecordNamesTheOtherProgram) {
   const trace::Trace trace = threads_trace(on_threads().at(13).executed("a", 0, 0, 5).finished("a", 0, 0));
-  const auto text = [&](const KernelRecord &record) {
-    const Investigation investigation = Investigation::of(trace, &record).value();
+  const auto text = [&](const std::vector<KernelRow> &rows) {
+    const Investigation investigation = Investigation::of(trace, testing::kernel_record_of(rows)).value();
     const Explanation one = investigation.explain(std::vector<Subject>{{{TaskId(0), 0}, false}}).value()[0];
     EXPECT_EQ(sum_of(one), 13 * kMillisecond);
     return to_text(trace, one);
   };
-  EXPECT_EQ(text(kernel_record(120)),
+  EXPECT_EQ(text(kernel_rows(120)),
             "d.a#0 met its deadline of 100ms with 87ms to spare\n"
             "1000000 its release was seen late\n"
             "1000000 unknown\n"
@@ -374,18 +379,44 @@ TEST(Why, TheKernelsRecordNamesTheOtherProgram) {
             "1999000 executed beyond its wcet of 2ms\n"
             "1000000 its body waited in the kernel\n"
             "2000000 executed beyond its wcet of 2ms\n");
-  EXPECT_NE(text(kernel_record(50)).find("2000000 real-time threads were throttled; stress-77 had the processor\n"),
+  EXPECT_NE(text(kernel_rows(50)).find("2000000 real-time threads were throttled; stress-77 had the processor\n"),
             std::string::npos);
+}
+
+// Two hosts in one record: each has a timer, and a thread that the other one's program is not told apart from by name.
+TEST(Why, TheKernelsRecordOfSeveralProcessesTellsThemApart) {
+  const trace::Trace trace = threads_trace(on_threads().at(13).executed("a", 0, 0, 5).finished("a", 0, 0));
+  std::vector<KernelRow> rows = kernel_rows(120);
+  rows.insert(rows.begin(), {KernelProcess{1010, "drive"}, KernelThread{1011, "redag-timer", 1010}});
+  const Investigation investigation = Investigation::of(trace, testing::kernel_record_of(rows)).value();
+  const Explanation one = investigation.explain(std::vector<Subject>{{{TaskId(0), 0}, false}}).value()[0];
+  EXPECT_NE(to_text(trace, one).find("500000 another program had the processor: stress-77"), std::string::npos);
+}
+
+TEST(Why, ADamagedRecordOfTheKernelIsAnError) {
+  const trace::Trace trace = threads_trace(on_threads().at(13).executed("a", 0, 0, 5).finished("a", 0, 0));
+  const std::string head = "{\"format\":\"redag.kernel/2\"}\n";
+  const auto explained = [&](const std::string &text) {
+    const KernelRecord record = KernelRecord::of(text, "kernel.jsonl").value();
+    const Investigation investigation = Investigation::of(trace, record).value();
+    return investigation.explain(std::vector<Subject>{{{TaskId(0), 0}, false}},
+                                 [](std::size_t, const Explanation &) {});
+  };
+  EXPECT_EQ(explained(head + "[\"lost\",3]\n[\"lost\",4]\n{\"end\":true}\n").value(), 7U);
+  EXPECT_FALSE(explained(head + "[\"lost\",3]\n"));
+  EXPECT_FALSE(explained(head + "nonsense\n{\"end\":true}\n"));
 }
 
 TEST(Why, SumsHoldWithAnyRecordOfTheKernel) {
   const trace::Trace trace = threads_trace(on_threads().at(13).executed("a", 0, 0, 5).finished("a", 0, 0));
   Rng rng(7);
   for (int i = 0; i < 1000; ++i) {
-    KernelRecord record = kernel_record();
-    std::erase_if(record.switches, [&](const KernelSwitch &) { return chance(rng, 0.4); });
-    for (KernelSwitch &one : record.switches) one.runnable = chance(rng, 0.5);
-    const Investigation investigation = Investigation::of(trace, &record).value();
+    std::vector<KernelRow> rows = kernel_rows();
+    std::erase_if(rows, [&](const KernelRow &) { return chance(rng, 0.4); });
+    for (KernelRow &row : rows) {
+      if (auto *const one = std::get_if<KernelSwitch>(&row)) one->runnable = chance(rng, 0.5);
+    }
+    const Investigation investigation = Investigation::of(trace, testing::kernel_record_of(rows)).value();
     const Explanation one = investigation.explain(std::vector<Subject>{{{TaskId(0), 0}, false}}).value()[0];
     ASSERT_EQ(sum_of(one), 13 * kMillisecond) << to_text(trace, one);
   }

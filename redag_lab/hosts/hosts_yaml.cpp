@@ -44,7 +44,10 @@ class HostsReader : private yaml::ValueReader {
   }
 
   void read_host(const Node &node) {
-    HostEntry host{.file = file_, .line = node.line, .column = node.column};
+    HostEntry host;
+    host.file = file_;
+    host.line = node.line;
+    host.column = node.column;
     if (!check_map(node, "a host", {"name", "result", "offset", "rate", "clock", "uncertainty"})) return;
     for (const char *key : {"name", "result"}) {
       if (find(node, key) != nullptr) continue;

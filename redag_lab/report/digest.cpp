@@ -36,7 +36,8 @@ bool Group::fits(const trace::RunInfo &run) const {
          trace::worker_count(run) == trace::worker_count(info()) && same_tasks(run.workload, workload());
 }
 
-Result<void> Group::add(const std::string &path, const trace::Recording &run, const metrics::KernelRecord *kernel) {
+Result<void> Group::add(const std::string &path, const trace::Recording &run,
+                        const std::optional<metrics::KernelRecord> &kernel) {
   REDAG_CHECK(fits(run.info()), "jobs of different runs counted together");
   const bool is_first = runs_.empty();
   if (is_first) begin(run.info());

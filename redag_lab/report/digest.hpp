@@ -73,7 +73,7 @@ class Group {
   /// kernel's record of it, if there is one. Requires fits(run.info()). Error: a damaged file; the group is then of no
   /// further use.
   [[nodiscard]] Result<void> add(const std::string &path, const trace::Recording &run,
-                                 const metrics::KernelRecord *kernel = nullptr);
+                                 const std::optional<metrics::KernelRecord> &kernel = std::nullopt);
   /// True if executor, mode and tasks are those of the group, whose jobs can then be counted together.
   [[nodiscard]] bool fits(const trace::RunInfo &info) const;
   /// States that the first run is one of several hosts.

@@ -65,8 +65,8 @@ Json to_json(const std::vector<WorstJob> &worst, const Workload &workload) {
 
 }  // namespace
 
-Result<WhyDigest> why_of(const trace::Recording &run, const metrics::KernelRecord *kernel, const Schedule &schedule,
-                         std::size_t most) {
+Result<WhyDigest> why_of(const trace::Recording &run, const std::optional<metrics::KernelRecord> &kernel,
+                         const Schedule &schedule, std::size_t most) {
   const Result<metrics::Investigation> investigation = metrics::Investigation::of(run, kernel, most);
   if (!investigation) return tl::unexpected<Diagnostics>(investigation.error());
   std::vector<metrics::Subject> subjects = investigation->misses();
@@ -88,7 +88,7 @@ Result<WhyDigest> why_of(const trace::Recording &run, const metrics::KernelRecor
     shown.emplace(rank, std::move(one));
     if (shown.size() > kMostShown) shown.erase(std::prev(shown.end()));
   };
-  const Result<void> explained = investigation->explain(subjects, take);
+  const Result<std::uint64_t> explained = investigation->explain(subjects, take);
   if (!explained) return tl::unexpected<Diagnostics>(explained.error());
   why.causes = causes.sorted();
   for (auto &[rank, one] : shown) why.jobs.push_back(std::move(one));

@@ -35,7 +35,7 @@ struct WhyDigest {
 
 /// Explains a run, up to `most` misses of it. Without a miss, the jobs are those that came closest to one. `kernel` is
 /// null if there is no record. Error: a damaged file.
-[[nodiscard]] Result<WhyDigest> why_of(const trace::Recording &run, const metrics::KernelRecord *kernel,
+[[nodiscard]] Result<WhyDigest> why_of(const trace::Recording &run, const std::optional<metrics::KernelRecord> &kernel,
                                        const Schedule &schedule, std::size_t most);
 
 /// Returns the object `why` of a group (docs/results_format.md) as JSON.

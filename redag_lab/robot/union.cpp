@@ -183,6 +183,7 @@ class Union {
     first_of_threads_[t] = levels_.size();
     Dag &dag = workload_.dags.emplace_back();
     dag.name = joined(kThreads, threads.name);
+    dag.is_foreign = true;
     for (std::uint32_t i = 0; i < threads.count; ++i) {
       task.name = threads.count == 1 ? "run" : fmt::format("run_{}", i + 1);
       dag.tasks.push_back(task);

@@ -12,6 +12,7 @@
 
 #include "redag/sched/policy.hpp"
 #include "redag_lab/robot/order.hpp"
+#include "redag_lab/search/analysed.hpp"
 #include "redag_testing/builders.hpp"
 #include "redag_testing/random_workloads.hpp"
 
@@ -221,6 +222,21 @@ TEST(RobotUnion, ThreadsOfARateAreTasks) {
   ASSERT_EQ(dag.tasks.size(), 2u);
   EXPECT_EQ(dag.tasks[1].period, 10 * kMillisecond);
   EXPECT_EQ(dag.tasks[1].wcet, kMillisecond);
+}
+
+// The slack of a foreign thread says nothing about the robot: the least one of a task does.
+TEST(RobotUnion, ThreadsThatKeepUpAreNotTheWeakest) {
+  Robot robot = robot_of({one_task(10), one_task(20)});
+  robot.threads.push_back(threads_at(Level::Kind::Above, 3 * kMillisecond, 4 * kMillisecond));
+  const auto weakest = [&] {
+    const Result<LoadedWorkload> united = union_of(robot, kLevels);
+    EXPECT_TRUE(united) << to_string(united.error());
+    const Workload &workload = united->workload;
+    return lab::weakest_row(lab::analyse(workload, analysis::platform_of(sched::config_of(workload))).value())->name;
+  };
+  EXPECT_EQ(weakest(), "p0/d.t");
+  robot.threads[0].wcet = 5 * kMillisecond;
+  EXPECT_EQ(weakest(), "threads/x.run") << "they take more than there is";
 }
 
 TEST(RobotUnion, ThreadsAboveComeFirstWhateverTheirPeriod) {

@@ -22,14 +22,16 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "redag/runtime/threads.hpp"
+
 namespace redag::lab {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostJobs = std::size_t{1} << 20U;  // with a thread; later jobs have none
 constexpr const char *kPrefix = "redag-";
-constexpr const char *kBufferKib = "8192";  // for each processor: about 100,000 events between two collect()
+constexpr Duration kSettled = 20 * kMillisecond;  // by then the kernel has written what it stamped
+constexpr const char *kBufferKib = "8192";        // for each processor: about 100,000 events between two collect()
 
 // The folder where tracefs is mounted, by the kernel's own list.
 std::optional<std::string> tracefs() {
@@ -120,47 +122,85 @@ Result<std::unique_ptr<KernelRecorder>> KernelRecorder::start(const std::vector<
   return recorder;
 }
 
-KernelRecorder::KernelRecorder(std::string instance) : instance_(std::move(instance)), jobs_(kMostJobs) {}
+KernelRecorder::KernelRecorder(std::string instance) : instance_(std::move(instance)) {}
 
 KernelRecorder::~KernelRecorder() {
   if (pipe_ >= 0) ::close(pipe_);
   ::rmdir(instance_.c_str());
 }
 
-void KernelRecorder::log(TaskId task, std::uint32_t number) noexcept {
+int KernelRecorder::this_thread() noexcept {
   static thread_local const int thread = static_cast<int>(::syscall(SYS_gettid));
-  const std::size_t at = used_.fetch_add(1, std::memory_order_relaxed);
-  if (at < jobs_.size()) jobs_[at] = {task, number, thread};
+  return thread;
+}
+
+Result<void> KernelRecorder::write_to(const std::string &path, const trace::RunInfo &run, Time origin) {
+  Result<metrics::KernelWriter> writer = metrics::KernelWriter::create(path, run.provenance);
+  if (!writer) return tl::unexpected<Diagnostics>(std::move(writer.error()));
+  writer_.emplace(*std::move(writer));
+  origin_ = origin;
+  writer_->add(metrics::KernelProcess{::getpid(), run.workload.name});
+  return {};
 }
 
 void KernelRecorder::collect() {
+  const Time until = runtime::monotonic_now() - kSettled;
+  read_pipe();
+  write(text_.take(until));
+}
+
+metrics::KernelWriter KernelRecorder::stop() {
+  write_file(instance_ + "/tracing_on", "0");
+  read_pipe();
+  write(text_.take(kNever));
+  return *std::move(writer_);
+}
+
+void KernelRecorder::read_pipe() {
   std::array<char, 65536> block{};
   for (ssize_t got = 1; got > 0;) {
     got = ::read(pipe_, block.data(), block.size());
     if (got > 0) text_.add({block.data(), static_cast<std::size_t>(got)});
   }
+}
+
+// Threads and jobs stand before what the kernel recorded of them.
+void KernelRecorder::write(std::vector<metrics::KernelRow> rows) {
+  write_threads();
+  jobs_.drain([this](const metrics::JobThread &job) { write(job); });
+  for (metrics::KernelRow &row : rows) {
+    if (auto *thread = std::get_if<metrics::KernelThread>(&row)) {
+      if (own_.contains(thread->thread)) continue;
+      thread->name += fmt::format("-{}", thread->thread);
+    } else if (auto *event = std::get_if<metrics::KernelSwitch>(&row)) {
+      event->time -= origin_;
+    } else if (auto *interrupt = std::get_if<metrics::KernelInterrupt>(&row)) {
+      interrupt->begin -= origin_;
+      interrupt->end -= origin_;
+    }
+    writer_->add(row);
+  }
+}
+
+void KernelRecorder::write_threads() {
   std::error_code error;
   for (fs::directory_iterator entry("/proc/self/task", error), end; !error && entry != end; entry.increment(error)) {
     const std::string name = entry->path().filename().string();
     int thread = 0;
     std::from_chars(name.data(), name.data() + name.size(), thread);
-    if (std::string comm = first_line(entry->path().string() + "/comm"); !comm.empty()) own_[thread] = std::move(comm);
+    std::string comm = first_line(entry->path().string() + "/comm");
+    if (comm.empty() || own_[thread] == comm) continue;
+    own_[thread] = comm;
+    writer_->add(metrics::KernelThread{thread, std::move(comm), ::getpid()});
   }
 }
 
-metrics::KernelRecord KernelRecorder::stop(Time origin) {
-  write_file(instance_ + "/tracing_on", "0");
-  collect();
-  metrics::KernelRecord record = text_.take(origin);
-  jobs_.resize(std::min(jobs_.size(), used_.load()));
-  record.jobs = std::move(jobs_);
-  for (auto &[thread, name] : record.names) name += fmt::format("-{}", thread);
-  for (const metrics::JobThread &job : record.jobs) record.own.insert(job.thread);
-  for (auto &[thread, name] : own_) {
-    record.own.insert(thread);
-    record.names[thread] = name;
+void KernelRecorder::write(const metrics::JobThread &job) {
+  // A thread that ended before its name was read is the process' all the same.
+  if (own_.try_emplace(job.thread).second) {
+    writer_->add(metrics::KernelThread{job.thread, fmt::format("thread {}", job.thread), ::getpid()});
   }
-  return record;
+  writer_->add(job);
 }
 
 }  // namespace redag::lab

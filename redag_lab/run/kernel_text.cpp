@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <iterator>
 #include <optional>
 #include <utility>
 
@@ -61,7 +62,7 @@ void KernelText::add(std::string_view text) {
 // A line such as "  redag-0-77  [001] d..2.  12.345678: sched_switch: prev_comm=... ==> next_comm=...".
 void KernelText::read(std::string_view line) {
   if (const std::size_t lost = line.find("[LOST "); line.rfind("CPU:", 0) == 0 && lost != std::string_view::npos) {
-    record_.lost += static_cast<std::uint64_t>(number(line.substr(lost + 6)).value_or(0));
+    lost_ += static_cast<std::uint64_t>(number(line.substr(lost + 6)).value_or(0));
     return;
   }
   constexpr std::string_view kEvents[] = {
@@ -84,7 +85,7 @@ void KernelText::read(std::string_view line) {
       open_[key] = {*time, *time, key.first, name_of(fields, soft)};
     } else if (const auto begun = open_.find(key); begun != open_.end()) {
       begun->second.end = *time;
-      record_.interrupts.push_back(begun->second);
+      events_.emplace_back(begun->second);
       open_.erase(begun);
     }
     return;
@@ -101,23 +102,35 @@ void KernelText::read_switch(Time time, int cpu, std::string_view fields) {
   const auto priority = number(field(next, " next_prio="));
   const std::string_view state = field(previous, " prev_state=");
   if (!from || !to || !priority || state.empty()) return;
-  record_.switches.push_back(
-      {time, cpu, static_cast<int>(*from), state.front() == 'R', static_cast<int>(*to), static_cast<int>(*priority)});
-  if (*to != 0) record_.names[static_cast<int>(*to)] = std::string(next.substr(0, next.rfind(" next_pid=")));
+  const int next_thread = static_cast<int>(*to);
+  events_.emplace_back(metrics::KernelSwitch{.time = time,
+                                             .cpu = cpu,
+                                             .from = static_cast<int>(*from),
+                                             .runnable = state.front() == 'R',
+                                             .to = next_thread,
+                                             .to_priority = static_cast<int>(*priority)});
+  if (next_thread == 0) return;
+  std::string name(next.substr(0, next.rfind(" next_pid=")));
+  std::string &known = names_[next_thread];
+  if (known == name) return;
+  known = std::move(name);
+  named_.emplace_back(metrics::KernelThread{next_thread, known, 0});
 }
 
-metrics::KernelRecord KernelText::take(Time origin) {
+std::vector<metrics::KernelRow> KernelText::take(Time until) {
+  const auto at = [](const metrics::KernelRow &row) { return *metrics::time_of(row); };
   // Keeps the order of what one processor did in one microsecond.
-  std::stable_sort(record_.switches.begin(), record_.switches.end(),
-                   [](const auto &a, const auto &b) { return a.time < b.time; });
-  std::stable_sort(record_.interrupts.begin(), record_.interrupts.end(),
-                   [](const auto &a, const auto &b) { return a.end < b.end; });
-  for (metrics::KernelSwitch &one : record_.switches) one.time -= origin;
-  for (metrics::KernelInterrupt &one : record_.interrupts) {
-    one.begin -= origin;
-    one.end -= origin;
-  }
-  return std::move(record_);
+  std::stable_sort(events_.begin(), events_.end(), [&](const auto &a, const auto &b) { return at(a) < at(b); });
+  const auto begin =
+      std::find_if(events_.begin(), events_.end(), [&](const auto &row) { return at(row) >= taken_until_; });
+  const auto end = std::find_if(begin, events_.end(), [&](const auto &row) { return at(row) >= until; });
+  lost_ += static_cast<std::uint64_t>(begin - events_.begin());
+  std::vector<metrics::KernelRow> rows = std::exchange(named_, {});
+  if (lost_ > 0) rows.emplace_back(metrics::KernelLoss{std::exchange(lost_, 0)});
+  rows.insert(rows.end(), std::make_move_iterator(begin), std::make_move_iterator(end));
+  events_.erase(events_.begin(), end);
+  taken_until_ = until;
+  return rows;
 }
 
 }  // namespace redag::lab

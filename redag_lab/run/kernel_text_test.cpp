@@ -23,27 +23,46 @@ constexpr std::string_view kText =
     " a next_pid=1 x-99      [001] d..2.   100.000040: sched_switch: prev_comm=a next_pid=1 x prev_pid=99 prev_prio=9 "
     "prev_state=S ==> next_comm=redag-0 next_pid=77 next_prio=48\n";
 
-void expect_all(const metrics::KernelRecord &record) {
-  const std::vector<metrics::KernelSwitch> switches = {
-      {1000, 1, 0, true, 77, 48}, {30'000, 1, 77, true, 99, 9}, {40'000, 1, 99, false, 77, 48}};
-  const std::vector<metrics::KernelInterrupt> interrupts = {{10'000, 12'000, 1, "virtio0-req.0"},
-                                                            {20'000, 21'000, 1, "softirq TIMER"}};
-  EXPECT_EQ(record.switches, switches);
-  EXPECT_EQ(record.interrupts, interrupts);
-  EXPECT_EQ(record.names, (std::map<int, std::string>{{77, "redag-0"}, {99, "a next_pid=1 x"}}));
-  EXPECT_EQ(record.lost, 12U);
-}
+constexpr Time kZero = 100 * kSecond;
+
+const std::vector<metrics::KernelRow> kRows = {
+    metrics::KernelThread{77, "redag-0", 0},
+    metrics::KernelThread{99, "a next_pid=1 x", 0},
+    metrics::KernelLoss{12},
+    metrics::KernelSwitch{kZero + 1000, 1, 0, true, 77, 48},
+    metrics::KernelInterrupt{kZero + 10'000, kZero + 12'000, 1, "virtio0-req.0"},
+    metrics::KernelInterrupt{kZero + 20'000, kZero + 21'000, 1, "softirq TIMER"},
+    metrics::KernelSwitch{kZero + 30'000, 1, 77, true, 99, 9},
+    metrics::KernelSwitch{kZero + 40'000, 1, 99, false, 77, 48}};
 
 TEST(KernelText, ReadsSwitchesInterruptsAndLosses) {
   KernelText text;
   text.add(kText);
-  expect_all(text.take(100 * kSecond));
+  EXPECT_EQ(text.take(kNever), kRows);
+  EXPECT_TRUE(text.take(kNever).empty());
 }
 
 TEST(KernelText, TakesLinesInPieces) {
   KernelText text;
   for (const char c : kText) text.add(std::string_view(&c, 1));
-  expect_all(text.take(100 * kSecond));
+  EXPECT_EQ(text.take(kNever), kRows);
+}
+
+TEST(KernelText, HoldsLaterEventsBack) {
+  KernelText text;
+  text.add(kText);
+  EXPECT_EQ(text.take(kZero + 12'000).size(), 4U);
+  const std::vector<metrics::KernelRow> rest = text.take(kNever);
+  EXPECT_EQ(rest, std::vector<metrics::KernelRow>(kRows.begin() + 4, kRows.end()));
+}
+
+TEST(KernelText, AnEventThatComesTooLateIsLost) {
+  KernelText text;
+  static_cast<void>(text.take(kZero + 20'000));
+  text.add(kText);
+  const std::vector<metrics::KernelRow> rows = text.take(kNever);
+  ASSERT_EQ(rows.size(), 6U);
+  EXPECT_EQ(rows[2], metrics::KernelRow(metrics::KernelLoss{14}));
 }
 
 TEST(KernelText, IgnoresWhatItDoesNotKnow) {
@@ -53,9 +72,7 @@ TEST(KernelText, IgnoresWhatItDoesNotKnow) {
     std::string damaged(kText);
     damaged.erase(i, 1);
     text.add(damaged);
-    const metrics::KernelRecord record = text.take(0);
-    EXPECT_LE(record.switches.size(), 3U);
-    EXPECT_LE(record.interrupts.size(), 2U);
+    EXPECT_LE(text.take(kNever).size(), 9U);
   }
 }
 

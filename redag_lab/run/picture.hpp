@@ -14,9 +14,10 @@
 namespace redag::lab {
 
 /// Reads the rest of `events` and writes the file `picture` (metrics::PerfettoWriter), in memory that does not grow
-/// with the run. `kernel` may be null. `is_stopped` is asked now and then: no picture is written once it is true, which
+/// with the run. `is_stopped` is asked now and then: no picture is written once it is true, which
 /// is an error.
 [[nodiscard]] Result<void> draw_picture(trace::EventsReader &events, const std::string &picture,
-                                        const metrics::KernelRecord *kernel, const std::function<bool()> &is_stopped);
+                                        const std::optional<metrics::KernelRecord> &kernel,
+                                        const std::function<bool()> &is_stopped);
 
 }  // namespace redag::lab

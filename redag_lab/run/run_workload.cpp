@@ -246,7 +246,8 @@ class Run {
     for (const auto &instance : instances_) {
       if (Result<void> started = instance->engine->start(); !started) return started;
     }
-    result_.origin = origin_ = runtime::monotonic_now() + kStartMargin;
+    origin_ = runtime::monotonic_now() + kStartMargin;
+    if (options_.on_start) options_.on_start(result_.trace.info, origin_);
     for (const auto &instance : instances_) {
       if (Result<void> started = start(*instance); !started) return started;
     }

@@ -59,6 +59,8 @@ struct RunOptions {
   std::string flight;
   trace::FlightOptions flight_options;
   const std::atomic<bool> *stop = nullptr;  // ends the run early when set (Ctrl-C)
+  /// Called once, before the first release, on the calling thread. `origin` is CLOCK_MONOTONIC at time 0 of the trace.
+  std::function<void(const trace::RunInfo &info, Time origin)> on_start;
   /// Takes the new events about ten times a second, in the order of the trace, on the calling thread. The result's
   /// trace then holds none, and memory does not grow with the run. `info` is that of the result, except `end` and
   /// `lost_events`.
@@ -75,7 +77,6 @@ struct RunResult {
   std::vector<std::string> overdue;     // the watchdog's reports
   std::vector<std::string> warnings;    // caveats for a reader of the figures
   bool stopped = false;                 // ended by `stop`
-  Time origin = 0;                      // CLOCK_MONOTONIC at time 0 of the trace
 };
 
 /// Runs a workload, which must be valid (validate()). Error: `os` or realtime_threads without the rights, or threads

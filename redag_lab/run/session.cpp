@@ -260,10 +260,14 @@ Result<Session> run_on_threads(const Workload &workload, const Variant &variant,
     return executors::make_scheduler(variant.executor, w, config);
   };
   std::unique_ptr<KernelRecorder> kernel;
+  Result<void> kernel_file;
   if (options.kernel) {
     Result<std::unique_ptr<KernelRecorder>> started = KernelRecorder::start(runtime::usable_cpus());
     if (!started) return tl::unexpected<Diagnostics>(std::move(started.error()));
     kernel = *std::move(started);
+    run.on_start = [&](const trace::RunInfo &info, Time origin) {
+      kernel_file = kernel->write_to(fmt::format("{}/{}", options.files.folder, metrics::kKernelFile), info, origin);
+    };
     run.bodies = [&kernel](std::vector<runtime::Body> bodies, const Now &) { return logged(bodies, *kernel); };
   }
   const auto is_realtime_run = [&run](const trace::RunInfo &info) {
@@ -278,7 +282,7 @@ Result<Session> run_on_threads(const Workload &workload, const Variant &variant,
   Session session;
   std::optional<Evaluation> evaluation;
   run.sink = [&](const trace::RunInfo &info, std::span<const JobEvent> events) {
-    if (kernel) kernel->collect();
+    if (kernel && kernel_file) kernel->collect();
     if (!evaluation) evaluation.emplace(session, charged(info), options, false);
     evaluation->add(events);
   };
@@ -293,10 +297,8 @@ Result<Session> run_on_threads(const Workload &workload, const Variant &variant,
   }
   evaluation->finish(charged(std::move(result->trace.info)));
   if (!evaluation->problems().empty()) return tl::unexpected<Diagnostics>(evaluation->problems());
-  if (kernel) {
-    session.kernel = kernel->stop(result->origin);
-    session.kernel->run = session.info.provenance;
-  }
+  if (!kernel_file) return tl::unexpected<Diagnostics>(std::move(kernel_file.error()));
+  if (kernel) session.kernel.emplace(kernel->stop());
   session.realtime_threads = realtime_threads;
   session.stopped = result->stopped;
   session.warnings = std::move(result->warnings);

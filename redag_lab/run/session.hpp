@@ -50,7 +50,7 @@ struct SessionOptions {
   bool live = false;   // publishes a live page for `redag top`
   std::string flight;  // folder for a record of the run that outlives the process; empty: none
   std::uint64_t flight_bytes = trace::FlightOptions{}.most_bytes;
-  bool kernel = false;    // records the kernel's switches and interrupts; an error if it refuses
+  bool kernel = false;    // records the kernel's switches and interrupts in files.folder; an error if it refuses
   Duration watchdog = 0;  // reports jobs that run for longer to `on_overdue` at once; 0: off
   std::function<void(const std::string &text)> on_overdue;
 };
@@ -66,7 +66,7 @@ struct Session {
   std::optional<Time> cut_at;                   // `max_events` was reached: they are those of a run that ended here
   metrics::CheckReport check;                   // of these events
   std::unique_ptr<metrics::RunFiles> files;     // of SessionOptions::files, not yet complete
-  std::optional<metrics::KernelRecord> kernel;  // of SessionOptions::kernel
+  std::optional<metrics::KernelWriter> kernel;  // the record of SessionOptions::kernel, not yet complete
   bool realtime_threads = false;                // the jobs ran on SCHED_FIFO threads
   std::uint64_t events = 0;                     // of the whole run
   Duration elapsed = 0;                         // wall-clock time of the run and its evaluation

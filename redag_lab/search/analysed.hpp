@@ -88,8 +88,8 @@ struct Row {
 [[nodiscard]] std::string task_name(const Analysed &analysed, TaskId task);
 [[nodiscard]] std::string device_name(const Analysed &analysed, DeviceId device);
 
-/// Returns the row with the least slack for its deadline, or without a bound. Returns nothing if a test accepts all
-/// tasks without numbers.
+/// Returns the row with the least slack for its deadline, or without a bound. Foreign threads that meet theirs are left
+/// out. Returns nothing if a test accepts all tasks without numbers.
 [[nodiscard]] std::optional<Row> weakest_row(const Analysed &analysed);
 
 /// Returns all tasks in the order in which a change of them is likely to help the row: those of its bound's largest

@@ -6,6 +6,7 @@
 
 Usage: hosts.py PROGRAM SOURCE_DIR. Uses the standard library only.
 """
+import gzip
 import json
 import re
 
@@ -164,6 +165,47 @@ class Hosts(Case):
             self.write("hosts.yaml", text.replace(wrong, mistake))
             result = self.expect(redag("merge-traces", file, "--out", self.folder / "merged", "--force"), 2)
             self.assertRegex(result.stderr, r"hosts\.yaml:[35]:\d+: error: ", mistake)
+
+    def tasks(self, name):
+        """The tasks of a recorded host, as text."""
+        head = json.loads((self.results[name] / "events.jsonl").read_text().partition("\n")[0])
+        return head["run"]["workload"].partition("dags:")[2]
+
+    def record_kernel(self, name, *rows):
+        """Puts a record of the kernel beside a host's events."""
+        head = json.loads((self.results[name] / "events.jsonl").read_text().partition("\n")[0])
+        lines = [{"format": "redag.kernel/2", "provenance": head["provenance"]}, *rows, {"end": True}]
+        with gzip.open(self.results[name] / "kernel.jsonl.gz", "wt") as file:
+            file.writelines(json.dumps(line) + "\n" for line in lines)
+
+    def test_records_of_the_kernel(self):
+        """Each host's processors and threads have their own numbers, on the clock of all."""
+        rows = [["process", 10, "robot"], ["thread", 10, "redag-0", 10], ["job", 0, 0, 10]]
+        self.record_kernel("vision", *rows, ["switch", 1000, 1, 0, False, 10, 48])
+        self.record_kernel("drive", *rows, ["thread", 20, "cc1plus-20", 0], ["switch", 60_000, 0, 10, True, 20, 120])
+        self.skew("drive", 50_000)
+        text = self.expect(self.merge("--offset", "vision=0", "--offset", "drive=50us+-80us"), 0).stdout
+        self.assertIn("kernel.jsonl.gz", text)
+        merged = self.folder / "merged"
+        with gzip.open(merged / "kernel.jsonl.gz", "rt") as file:
+            head, *lines, last = map(json.loads, file)
+        self.assertEqual((head["format"], last), ("redag.kernel/2", {"end": True}))
+        events = json.loads(self.expect(redag("events", merged), 0).stdout.partition("\n")[0])
+        self.assertEqual(head["provenance"], events["provenance"])
+        second = 1 << 22
+        self.assertEqual([line for line in lines if line[0] != "job"],
+                         [["process", 10, "vision/robot"], ["thread", 10, "redag-0", 10],
+                          ["switch", 1000, 1, 0, False, 10, 48],
+                          ["process", second + 10, "drive/robot"], ["thread", second + 10, "redag-0", second + 10],
+                          ["thread", second + 20, "drive/cc1plus-20", 0],
+                          ["switch", 10_000, 2, second + 10, True, second + 20, 120]])
+        first = self.tasks("vision").count("- {name:")
+        self.assertEqual([line for line in lines if line[0] == "job"], [["job", 0, 0, 10], ["job", first, 0, second + 10]])
+        self.expect(redag("why", merged), 0)
+        self.expect(redag("report", merged), 0)
+        # A run without such records leaves none, and a damaged one is named.
+        (self.results["drive"] / "kernel.jsonl.gz").write_text("nonsense")
+        self.expect(self.merge("--offset", "vision=0", "--offset", "drive=50us+-80us"), 2, "drive/kernel.jsonl.gz:1")
 
     def test_bad_input(self):
         zero = ["--offset", "vision=0", "--offset", "drive=0"]

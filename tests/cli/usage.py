@@ -13,8 +13,8 @@ import subprocess
 
 from program import CART, MISTAKEN, PROGRAM, SOURCE, Case, main, redag
 
-COMMANDS = [["validate"], ["generate"], ["simulate"], ["run"], ["calibrate"], ["compare"], ["diff"], ["analyze"], ["sensitivity"], ["assign"], ["tune"], ["import"],
-            ["check-trace"], ["recover"], ["events"], ["why"], ["top"], ["serve"], ["export"], ["report"], ["completion"], ["man"], ["experiment"], ["experiment", "acceptance"],
+COMMANDS = [["validate"], ["generate"], ["simulate"], ["run"], ["calibrate"], ["compare"], ["diff"], ["analyze"], ["sensitivity"], ["assign"], ["tune"], ["arrange"], ["import"],
+            ["check-trace"], ["recover"], ["merge-traces"], ["events"], ["why"], ["top"], ["serve"], ["export"], ["report"], ["completion"], ["man"], ["experiment"], ["experiment", "acceptance"],
             ["experiment", "factorial"], ["experiment", "merge"], ["experiment", "cost"], ["experiment", "submit"]]
 
 
@@ -42,6 +42,7 @@ class Usage(Case):
         page = (SOURCE / "docs" / "cli.md").read_text(encoding="utf-8")
         helps = {" ".join(command): redag(*command, "--help").stdout for command in COMMANDS}
         commands = re.findall(r"^  ([a-z][a-z-]+) {2,}", redag("--help").stdout.split("Commands:")[1], re.M)
+        self.assertEqual(set(commands), {command[0] for command in COMMANDS})
         for command in commands:
             self.assertRegex(page, rf"(?m)^\|.*`{command}[ `].*\|")
         for section in re.split(r"(?m)^## ", page):

@@ -114,9 +114,10 @@ class Why(Case):
         self.expect(redag("why", folder, "control.contoller"), 2, "did you mean 'control.controller'?")
         self.expect(redag("why", folder, "control.controller#9999"), 2, "its jobs are 0 to")
         self.expect(redag("why", folder, "control.controller#x"), 2, "has no job 'x'")
-        (folder / "kernel.jsonl").write_text("nonsense\n")
-        self.expect(redag("why", folder), 2, "kernel.jsonl:1", "not a kernel's record")
-        (folder / "kernel.jsonl").unlink()
+        record = folder / "kernel.jsonl.gz"
+        record.write_text("nonsense\n")
+        self.expect(redag("why", folder), 2, "kernel.jsonl.gz:1", "not a kernel's record")
+        record.unlink()
         self.expect(redag("compare", SOURCE / "workloads" / "robot.yaml", "--simulate", "--duration", "1s", "--out",
                           self.folder / "many"), 0)
         self.expect(redag("why", self.folder / "many"), 2, "runs", "name one of them")

@@ -29,7 +29,6 @@ namespace redag::cli {
 namespace {
 
 namespace fs = std::filesystem;
-using metrics::read_kernel_record_of;
 
 struct Options {
   std::vector<std::string> places;
@@ -89,7 +88,7 @@ class Reporting {
               "name folders that hold one kind of run each");
           return false;
         }
-        const Result<std::optional<metrics::KernelRecord>> kernel = read_kernel_record_of(file, trace->info());
+        const Result<std::optional<metrics::KernelRecord>> kernel = metrics::KernelRecord::beside(file, trace->info());
         if (!kernel) {
           progress_.clear();
           console_.note(kernel.error());
@@ -102,8 +101,7 @@ class Reporting {
           return false;
         }
         if (*hosts && !any) group.set_hosts({std::move((*hosts)->document), (*hosts)->missed, (*hosts)->unknown});
-        const Result<void> added =
-            group.add(fs::path(file).parent_path().string(), *trace, *kernel ? &**kernel : nullptr);
+        const Result<void> added = group.add(fs::path(file).parent_path().string(), *trace, *kernel);
         if (!added) {
           progress_.clear();
           console_.note(added.error());

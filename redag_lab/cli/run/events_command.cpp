@@ -153,9 +153,9 @@ Result<void> convert(const EventsOptions &options, Console &console) {
   if (!reader) return tl::unexpected<Diagnostics>(std::move(reader.error()));
   const InterruptGuard guard;
   if (options.format == Format::Perfetto) {
-    const Result<std::optional<metrics::KernelRecord>> kernel = metrics::read_kernel_record_of(*file, reader->info());
+    const Result<std::optional<metrics::KernelRecord>> kernel = metrics::KernelRecord::beside(*file, reader->info());
     if (!kernel) return tl::unexpected<Diagnostics>(kernel.error());
-    return lab::draw_picture(*reader, options.output, *kernel ? &**kernel : nullptr, InterruptGuard::interrupted);
+    return lab::draw_picture(*reader, options.output, *kernel, InterruptGuard::interrupted);
   }
   const Result<std::unique_ptr<Converter>> converter = converter_for(options, *reader, console);
   if (!converter) return tl::unexpected<Diagnostics>(converter.error());

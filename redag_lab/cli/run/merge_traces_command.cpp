@@ -24,6 +24,7 @@
 #include "redag_lab/hosts/chains.hpp"
 #include "redag_lab/hosts/document.hpp"
 #include "redag_lab/hosts/hosts_yaml.hpp"
+#include "redag_lab/hosts/merged_kernel.hpp"
 #include "redag_lab/hosts/merged_run.hpp"
 #include "redag_lab/hosts/time_service.hpp"
 #include "redag_lab/robot/input.hpp"
@@ -261,6 +262,19 @@ Result<lab::Session> evaluate(const hosts::MergedRun &merged, std::vector<hosts:
   return session;
 }
 
+// Begins the merged record of the hosts' kernels. Nothing if no host has one.
+Result<std::optional<metrics::KernelWriter>> merge_kernels(const hosts::MergedRun &merged, const std::string &folder) {
+  const Result<std::vector<hosts::HostKernel>> kernels = hosts::open_kernel_records(merged);
+  if (!kernels) return tl::unexpected<Diagnostics>(kernels.error());
+  if (kernels->empty()) return std::optional<metrics::KernelWriter>();
+  Result<metrics::KernelWriter> writer =
+      metrics::KernelWriter::create(fmt::format("{}/{}", folder, metrics::kKernelFile), merged.info.provenance);
+  if (!writer) return tl::unexpected<Diagnostics>(std::move(writer.error()));
+  const Result<void> written = hosts::merge_kernel_records(merged, *kernels, InterruptGuard::interrupted, *writer);
+  if (!written) return tl::unexpected<Diagnostics>(written.error());
+  return std::optional<metrics::KernelWriter>(*std::move(writer));
+}
+
 int merge(const Options &options, Console &console) {
   const auto refuse = [&console](const Diagnostics &mistakes) {
     console.note(mistakes);
@@ -279,6 +293,9 @@ int merge(const Options &options, Console &console) {
   hosts::ChainWatch watch(*merged, *std::move(chains));
   Result<lab::Session> session = evaluate(*merged, *runs, watch, options.folder);
   if (!session) return refuse(session.error());
+  Result<std::optional<metrics::KernelWriter>> kernel = merge_kernels(*merged, options.folder);
+  if (!kernel) return refuse(kernel.error());
+  session->kernel = *std::move(kernel);
   const std::string document = hosts::to_json(*merged, watch);
   if (options.json) {
     console.print(document);

@@ -241,6 +241,20 @@ Json to_json(const lab::Session &session) {
   return document;
 }
 
+namespace {
+
+// Draws a picture again, with the kernel's record beside the events.
+Result<void> draw_with_kernel(const metrics::RunFiles &files) {
+  Result<trace::EventsReader> events = trace::EventsReader::open(files.events_path());
+  if (!events) return tl::unexpected<Diagnostics>(std::move(events.error()));
+  const Result<std::optional<metrics::KernelRecord>> kernel =
+      metrics::KernelRecord::beside(files.events_path(), events->info());
+  if (!kernel) return tl::unexpected<Diagnostics>(kernel.error());
+  return lab::draw_picture(*events, files.picture_path(), *kernel, [] { return false; });
+}
+
+}  // namespace
+
 WrittenFiles write_session(lab::Session &session, const metrics::FilesOptions &options) {
   WrittenFiles written;
   const auto keep = [&written](const Diagnostics &problems) {
@@ -271,15 +285,10 @@ WrittenFiles write_session(lab::Session &session, const metrics::FilesOptions &o
     }
   }
   if (session.kernel) {
-    keep_if_failed(metrics::write_kernel_record(options.folder + "/kernel.jsonl", *session.kernel));
-    written.names += ", kernel.jsonl";
+    keep_if_failed(session.kernel->commit());
+    written.names += fmt::format(", {}", metrics::kKernelFile);
     // What the kernel did is known only now.
-    if (written.has_picture && written.problems.empty()) {
-      Result<trace::EventsReader> events = trace::EventsReader::open(session.files->events_path());
-      keep_if_failed(
-          events ? lab::draw_picture(*events, session.files->picture_path(), &*session.kernel, [] { return false; })
-                 : tl::unexpected<Diagnostics>(std::move(events.error())));
-    }
+    if (written.has_picture && written.problems.empty()) keep_if_failed(draw_with_kernel(*session.files));
   }
   return written;
 }

@@ -50,18 +50,13 @@ class Explaining {
     if (!file) return tl::unexpected<Diagnostics>(file.error());
     const Result<trace::Recording> trace = trace::Recording::open(*file);
     if (!trace) return tl::unexpected<Diagnostics>(trace.error());
-    const Result<std::optional<metrics::KernelRecord>> kernel = metrics::read_kernel_record_of(*file, trace->info());
+    const Result<std::optional<metrics::KernelRecord>> kernel = metrics::KernelRecord::beside(*file, trace->info());
     if (!kernel) return tl::unexpected<Diagnostics>(kernel.error());
     if (trace->info().lost_events > 0) {
       console_.warn(fmt::format("{} events of this run were lost: explanations can be wrong",
                                 format_count(trace->info().lost_events)));
     }
-    if (*kernel && (*kernel)->lost > 0) {
-      console_.warn(fmt::format("the kernel dropped {} of its events: other programs can be missing",
-                                format_count((*kernel)->lost)));
-    }
-    const Result<metrics::Investigation> investigation =
-        metrics::Investigation::of(*trace, *kernel ? &**kernel : nullptr, kMostExplained);
+    const Result<metrics::Investigation> investigation = metrics::Investigation::of(*trace, *kernel, kMostExplained);
     if (!investigation) return tl::unexpected<Diagnostics>(investigation.error());
     return options_.job.empty() ? explain_run(*investigation) : explain_job(*investigation);
   }
@@ -75,7 +70,7 @@ class Explaining {
     overview.explained = subjects.size();
     overview.explanations.resize(options_.all || options_.json ? subjects.size() : std::min(kRows, subjects.size()));
     metrics::CulpritCount causes;
-    const Result<void> explained = investigation.explain(subjects, [&](std::size_t rank, metrics::Explanation one) {
+    const Result<void> explained = explain(investigation, subjects, [&](std::size_t rank, metrics::Explanation one) {
       causes.add(one);
       if (rank < overview.explanations.size()) overview.explanations[rank] = std::move(one);
     });
@@ -99,10 +94,13 @@ class Explaining {
     if (!*found) return kExitBad;
     metrics::Subject subject = **found;
     if (options_.end_to_end) subject.end_to_end = true;
-    Result<std::vector<metrics::Explanation>> explained = investigation.explain({&subject, 1});
-    if (!explained) return tl::unexpected<Diagnostics>(std::move(explained.error()));
     WhyOverview overview;
-    overview.explanations = *std::move(explained);
+    overview.explanations.resize(1);
+    const Result<void> explained =
+        explain(investigation, {&subject, 1}, [&](std::size_t /*index*/, metrics::Explanation explanation) {
+          overview.explanations.front() = std::move(explanation);
+        });
+    if (!explained) return tl::unexpected<Diagnostics>(explained.error());
     const metrics::Explanation &one = overview.explanations.front();
     overview.explained = 1;
     overview.misses = one.miss == metrics::Miss::None ? 0 : 1;
@@ -116,6 +114,16 @@ class Explaining {
       console_.say(describe(one, investigation.run(), console_.out_traits(), options_.all ? 0 : kParts));
     }
     return kExitOk;
+  }
+
+  Result<void> explain(const metrics::Investigation &investigation, std::span<const metrics::Subject> subjects,
+                       const metrics::Investigation::Visit &visit) {
+    const Result<std::uint64_t> lost = investigation.explain(subjects, visit);
+    if (!lost) return tl::unexpected<Diagnostics>(lost.error());
+    if (*lost == 0) return {};
+    console_.warn(
+        fmt::format("the kernel dropped {} of its events: other programs can be missing", format_count(*lost)));
+    return {};
   }
 
   // Returns the job that the user names: "dag.task#12", or "dag.task" for the worst one of the task. Without one, says

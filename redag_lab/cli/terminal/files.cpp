@@ -143,7 +143,7 @@ bool is_result_name(std::string_view name) {
                                                        "shards",
                                                        "merged",
                                                        "logs",
-                                                       "kernel.jsonl"};
+                                                       "kernel.jsonl.gz"};
   if (std::find(kNames.begin(), kNames.end(), name) != kNames.end()) return true;
   // Folders of a comparison (executors, and repetitions below them), and the files of `generate`.
   const std::vector<std::string> &executors = lab::variant_names();
