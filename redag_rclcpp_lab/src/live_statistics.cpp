@@ -113,11 +113,12 @@ std::string_view without_slashes(std::string_view text) {
   return text;
 }
 
-/// A callback that no file names is "/imu timer 2 ms (0)" in the DAG "/imu". Returns what follows the DAG's name.
-std::string_view within(std::string_view task, std::string_view dag) {
-  const bool has_prefix =
-      !dag.empty() && task.size() > dag.size() + 1 && task.substr(0, dag.size()) == dag && task[dag.size()] == ' ';
-  return has_prefix ? task.substr(dag.size() + 1) : task;
+/// Returns the node and the rest of the name of a callback that no file names, such as "/imu timer 2 ms (0)"; otherwise
+/// the name and "".
+std::pair<std::string_view, std::string_view> parts_of(std::string_view task) {
+  const std::size_t end = task.find(' ');
+  if (task.empty() || task.front() != '/' || end == std::string_view::npos) return {task, {}};
+  return {task.substr(0, end), task.substr(end + 1)};
 }
 
 template <class Columns>
@@ -209,8 +210,8 @@ void LiveStatistics::add_executor(const Listed &listed, redag::Time now) {
     add_row(prefix, dag.figures, frame, kFigures);
   }
   for (const TaskFrame &task : frame.tasks) {
-    const std::string &dag = frame.dags[task.dag].name;
-    const std::string prefix = prefix_of({executor, dag, within(task.name, dag)});
+    const auto [name, rest] = parts_of(task.name);
+    const std::string prefix = prefix_of({executor, frame.dags[task.dag].name, name, rest});
     add_row(prefix, task, frame, kOfTasks);
     add_row(prefix, task.figures, frame, kFigures);
   }

@@ -12,7 +12,7 @@
 
 namespace redag_rclcpp::lab {
 
-/// An executor with a DAG that a file names, and a node that none names.
+/// An executor with a DAG that a file names, and a callback that none names.
 inline redag::live::Frame small_frame(const std::string &name = "robot", redag::Time began = 10 * redag::kSecond) {
   using redag::kMillisecond;
   using redag::kSecond;
@@ -24,7 +24,7 @@ inline redag::live::Frame small_frame(const std::string &name = "robot", redag::
   frame.began = began;
   frame.published = began + 10 * kSecond;
   frame.window = 2 * kSecond;
-  frame.dags = {{.name = "control", .max_active = 1, .deadline = 5 * kMillisecond, .late = 3}, {.name = "/ns/imu"}};
+  frame.dags = {{.name = "control", .max_active = 1, .deadline = 5 * kMillisecond, .late = 3}, {.name = "ros"}};
   frame.tasks = {
       {.name = "pid", .dag = 0, .period = 10 * kMillisecond, .deadline = 8 * kMillisecond, .bound = 2 * kMillisecond},
       {.name = "/ns/imu timer 2 ms (0)", .dag = 1, .period = 2 * kMillisecond}};
@@ -54,7 +54,7 @@ inline redag::live::Frame large_frame(std::uint32_t tasks) {
   frame.tasks.clear();
   for (std::uint32_t i = 0; i < tasks; ++i) {
     const std::string node = "/perception/camera_" + std::to_string(i / 10);
-    if (i % 10 == 0) frame.dags.push_back({.name = node});
+    if (i % 10 == 0) frame.dags.push_back({.name = "pipeline_" + std::to_string(i / 10)});
     redag::live::TaskFrame task{.name = node + " subscription /perception/image_" + std::to_string(i) + " (0)",
                                 .dag = i / 10,
                                 .period = redag::kMillisecond,

@@ -68,18 +68,18 @@ TEST(LiveStatistics, HaveTheFiguresInSeconds) {
 TEST(LiveStatistics, LeaveOutWhatARowDoesNotHave) {
   LiveStatistics statistics({}, 1);
   statistics.update({listed(small_frame())}, 20 * kSecond);
-  EXPECT_EQ(value(statistics, "robot/ns/imu/timer 2 ms (0)/period"), 0.002);
-  EXPECT_EQ(value(statistics, "robot/ns/imu/timer 2 ms (0)/deadline"), std::nullopt);
-  EXPECT_EQ(value(statistics, "robot/ns/imu/timer 2 ms (0)/bound"), std::nullopt);
-  EXPECT_EQ(value(statistics, "robot/ns/imu/late"), std::nullopt);
+  EXPECT_EQ(value(statistics, "robot/ros/ns/imu/timer 2 ms (0)/period"), 0.002);
+  EXPECT_EQ(value(statistics, "robot/ros/ns/imu/timer 2 ms (0)/deadline"), std::nullopt);
+  EXPECT_EQ(value(statistics, "robot/ros/ns/imu/timer 2 ms (0)/bound"), std::nullopt);
+  EXPECT_EQ(value(statistics, "robot/ros/late"), std::nullopt);
 }
 
 TEST(LiveStatistics, SelectFigures) {
   LiveStatistics statistics({"misses", "alert"}, 1);
   statistics.update({listed(small_frame())}, 20 * kSecond);
   EXPECT_THAT(statistics.names(),
-              ElementsAre("robot/alert", "robot/control/misses", "robot/ns/imu/misses", "robot/control/pid/misses",
-                          "robot/ns/imu/timer 2 ms (0)/misses", "executors", "unreadable_pages", "left_out"));
+              ElementsAre("robot/alert", "robot/control/misses", "robot/ros/misses", "robot/control/pid/misses",
+                          "robot/ros/ns/imu/timer 2 ms (0)/misses", "executors", "unreadable_pages", "left_out"));
   for (const std::string &name : statistics.names()) {
     const std::string figure = name.substr(name.rfind('/') + 1);
     if (figure != name) {

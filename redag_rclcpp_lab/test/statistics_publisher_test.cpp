@@ -178,7 +178,8 @@ TEST_F(StatisticsPublisherTest, AThousandCallbacksFit) {
   const auto publish = [this] { publisher_->publish(); };
   ASSERT_TRUE(reader.until([&] { return !reader.matched.empty(); }, publish));
   EXPECT_EQ(reader.matched.at("left_out"), 0);
-  EXPECT_EQ(reader.matched.at("large/perception/camera_99/subscription /perception/image_999 (0)/released"), 999);
+  EXPECT_EQ(reader.matched.at("large/pipeline_99/perception/camera_99/subscription /perception/image_999 (0)/released"),
+            999);
   const auto size_of = [](const auto &message) {
     rclcpp::SerializedMessage serialized;
     rclcpp::Serialization<std::decay_t<decltype(message)>>().serialize_message(&message, &serialized);
