@@ -6,8 +6,8 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
 #include <deque>
+#include <limits>
 #include <span>
 #include <vector>
 
