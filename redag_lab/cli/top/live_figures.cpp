@@ -20,12 +20,6 @@ constexpr Duration kPatience = kSecond;
 
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
-double per_second(double amount, Duration time) { return time > 0 ? amount * 1e9 / static_cast<double>(time) : 0; }
-
-Duration time_of(const Frame &frame, bool since_start) {
-  return since_start ? frame.published - frame.began : frame.window;
-}
-
 const Figures &figures_of(const LiveRow &row, const Frame &frame) {
   return row.is_dag ? frame.dags[row.index].figures : frame.tasks[row.index].figures;
 }
@@ -99,31 +93,6 @@ std::vector<LiveRow> rows_of(const Frame &frame, const LiveView &view) {
   });
   if (view.reversed) std::reverse(rows.begin(), rows.end());
   return rows;
-}
-
-double rate_of(const Figures &figures, const Frame &frame, bool since_start) {
-  return per_second(static_cast<double>(since_start ? figures.finished : figures.recent_jobs),
-                    time_of(frame, since_start));
-}
-
-double cpu_of(const Figures &figures, const Frame &frame, bool since_start) {
-  return per_second(static_cast<double>(since_start ? figures.cpu : figures.recent_cpu) / 1e9,
-                    time_of(frame, since_start));
-}
-
-double share_of(const live::ThreadFrame &thread, const Frame &frame, bool since_start) {
-  return per_second(static_cast<double>(since_start ? thread.used : thread.recent_used) / 1e9,
-                    time_of(frame, since_start));
-}
-
-double share_of(const live::DeviceFrame &device, const Frame &frame, bool since_start) {
-  return per_second(static_cast<double>(since_start ? device.busy : device.recent_busy) / 1e9 / device.slots,
-                    time_of(frame, since_start));
-}
-
-double rate_of(const live::DeviceFrame &device, const Frame &frame, bool since_start) {
-  return per_second(static_cast<double>(since_start ? device.served : device.recent_served),
-                    time_of(frame, since_start));
 }
 
 LiveResponse response_of(const Figures &figures, bool since_start) {

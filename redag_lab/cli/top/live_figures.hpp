@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What `redag top` makes of the figures of a frame: rates, shares, sums, verdicts on times, and the rows to show. Pure
-// functions.
+// What `redag top` makes of the figures of a frame: sums, verdicts on times, and the rows to show. Rates and shares are
+// those of redag/live/rates.hpp. Pure functions.
 #pragma once
 
 #include <cstdint>
@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "redag/live/frame.hpp"
+#include "redag/live/rates.hpp"
 #include "redag_analysis/text/tint.hpp"
 
 namespace redag::cli {
@@ -44,16 +45,6 @@ struct LiveRow {
 
 /// True if `text` contains `part`, whatever the case of ASCII letters.
 [[nodiscard]] bool contains(const std::string &text, const std::string &part);
-
-/// Jobs that finished, per second.
-[[nodiscard]] double rate_of(const live::page::Figures &figures, const live::Frame &frame, bool since_start);
-/// Processor time as a share of one processor.
-[[nodiscard]] double cpu_of(const live::page::Figures &figures, const live::Frame &frame, bool since_start);
-[[nodiscard]] double share_of(const live::ThreadFrame &thread, const live::Frame &frame, bool since_start);
-/// Time of the services of a device as a share of all its slots.
-[[nodiscard]] double share_of(const live::DeviceFrame &device, const live::Frame &frame, bool since_start);
-/// Services that ended, per second.
-[[nodiscard]] double rate_of(const live::DeviceFrame &device, const live::Frame &frame, bool since_start);
 
 struct LiveResponse {
   Duration p50 = 0;

@@ -81,17 +81,6 @@ TEST(LiveFigures, SayThatNobodyWrites) {
   EXPECT_EQ(overdue(strange, 25 * kSecond), std::nullopt);
 }
 
-TEST(LiveFigures, RatesAreOfTheWindowOrOfAll) {
-  const live::Listed listed = small_page();
-  const live::Frame &frame = listed.page->frame;
-  EXPECT_EQ(rate_of(frame.tasks[0].figures, frame, false), 10);  // 20 jobs in 2 s
-  EXPECT_EQ(rate_of(frame.tasks[0].figures, frame, true), 10);   // 100 jobs in 10 s
-  EXPECT_DOUBLE_EQ(cpu_of(frame.tasks[0].figures, frame, false), 0.05);
-  EXPECT_DOUBLE_EQ(share_of({.used = kSecond, .recent_used = kSecond}, frame, false), 0.5);
-  EXPECT_DOUBLE_EQ(share_of({.used = kSecond, .recent_used = kSecond}, frame, true), 0.1);
-  EXPECT_EQ(rate_of(frame.tasks[0].figures, live::Frame{}, false), 0);
-}
-
 TEST(LiveJson, HasWhatIsShown) {
   live::Listed listed = small_page();
   live::Frame &frame = listed.page->frame;
