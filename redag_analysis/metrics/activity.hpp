@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -74,7 +75,7 @@ class Activity {
   std::deque<Part> parts_;         // keeps its elements where they are
   std::vector<TaskPlace> places_;  // by TaskId
   Time begin_;
-  Time time_ = 0;
+  Time time_ = std::numeric_limits<Time>::min();
   bool any_ = false;
   Time inverted_since_ = kNever;
   Inversions inversions_;

@@ -104,8 +104,8 @@ void ReleaseRules::check_data_release(const JobEvent &event) {
     return "it was released although " + trace::task_name(context_.info.workload, absent) +
            " has not completed since the task's last release";
   });
-  Time finish = 0;
-  Time decided = 0;
+  Time finish = std::numeric_limits<Time>::min();  // a merged run can begin before 0
+  Time decided = finish;
   for (const std::uint32_t edge : task.in) {
     finish = std::max(finish, edges_[edge].finish);
     decided = std::max(decided, edges_[edge].finish_decided);

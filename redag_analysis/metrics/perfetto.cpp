@@ -46,7 +46,12 @@ const char *to_text(Miss miss) {
 class PerfettoWriter::Impl {
  public:
   Impl(trace::OutputFile file, const trace::RunInfo &run, std::optional<KernelReader> kernel)
-      : writer_(std::move(file)), run_(run), refs_(flatten(run.workload)), watch_(run.workload), counters_(writer_) {
+      : writer_(std::move(file)),
+        run_(run),
+        refs_(flatten(run.workload)),
+        watch_(run.workload),
+        counters_(writer_),
+        last_time_(run.start) {
     write_run();
     add_workers();
     add_tasks();
@@ -362,7 +367,7 @@ class PerfettoWriter::Impl {
   ArgumentName slack_ = ArgumentName::None;
   std::vector<Argument> arguments_;  // reused
   std::uint64_t flows_ = 0;
-  Time last_time_ = 0;
+  Time last_time_;
 };
 
 PerfettoWriter::PerfettoWriter(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}

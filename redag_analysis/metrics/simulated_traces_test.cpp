@@ -40,6 +40,39 @@ RC_GTEST_PROP(SimulatedTraces, KeepEveryRule, ()) {
   RC_ASSERT(report.ok());
 }
 
+// The run of a host whose clock is behind the common one (redag_lab/hosts) begins before time 0.
+RC_GTEST_PROP(SimulatedTraces, KeepEveryRuleAtAnyTime, ()) {
+  const auto seed = *rc::gen::arbitrary<std::uint64_t>();
+  const trace::Trace trace = simulated(drawn(seed), 100 * kMillisecond);
+  trace::Trace shifted = trace;
+  const Duration by = *rc::gen::inRange<Duration>(-kSecond, kSecond);
+  shifted.info.start += by;
+  shifted.info.end += by;
+  for (JobEvent &event : shifted.events) {
+    event.time += by;
+    switch (event.kind) {
+      case JobEventKind::Released:
+      case JobEventKind::Ready:
+      case JobEventKind::Dispatched:
+      case JobEventKind::Started:
+      case JobEventKind::Finished:
+      case JobEventKind::Aborted:
+      case JobEventKind::LowMode: event.value += by; break;
+      default: break;
+    }
+  }
+  const CheckReport report = check_trace(shifted);
+  RC_LOG() << report.to_string();
+  RC_ASSERT(report.ok());
+  const Summary before = summarize(trace);
+  const Summary after = summarize(shifted);
+  RC_ASSERT(after.total.missed() == before.total.missed());
+  RC_ASSERT(after.inversions.count == before.inversions.count);
+  for (std::size_t t = 0; t < before.tasks.size(); ++t) {
+    RC_ASSERT(after.tasks[t].jobs.response == before.tasks[t].jobs.response);
+  }
+}
+
 trace::RunInfo on_peer(trace::RunInfo info, const executors::ExecutorKind &peer) {
   info.executor = peer.name;
   info.config = executors::effective_config(peer, info.config);

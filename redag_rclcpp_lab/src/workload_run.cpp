@@ -10,21 +10,26 @@
 #include <chrono>
 #include <exception>
 #include <functional>
+#include <map>
 #include <memory>
 #include <numeric>
 #include <thread>
 #include <utility>
 
+#include "isolated_peer.hpp"
 #include "node_events.hpp"
 #include "peers.hpp"
 #include "raised_thread.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/mutex.hpp"
+#include "redag/runtime/setup.hpp"
 #include "redag/runtime/threads.hpp"
+#include "redag/sched/policy.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"
 #include "redag_rclcpp/executor.hpp"
 #include "workload_nodes.hpp"
+#include "workload_part.hpp"
 
 namespace redag_rclcpp::lab {
 
@@ -51,12 +56,28 @@ std::optional<PreemptionMode> preemption_of(const std::string &name) {
   return std::nullopt;
 }
 
+std::uint32_t number_of_tasks(const redag::Workload &workload) {
+  std::size_t tasks = 0;
+  for (const redag::Dag &dag : workload.dags) tasks += dag.tasks.size();
+  return static_cast<std::uint32_t>(tasks);
+}
+
+// In other modes an executor warns that it does not take part in a common order.
+bool can_be_os(PreemptionMode mode) { return mode == PreemptionMode::Os || mode == PreemptionMode::Auto; }
+
 class Run {
  public:
-  Run(const redag::Workload &workload, const WorkloadRunOptions &options) : workload_(workload), options_(options) {
+  Run(const redag::Workload &whole, const WorkloadRunOptions &options)
+      : whole_(whole), workload_(whole), options_(options) {
+    if (options_.only_dag > 0) {
+      WorkloadPart part = part_of(whole_, options_.only_dag - 1);
+      workload_ = std::move(part.workload);
+      first_task_ = part.first_task;
+    }
     // The check judges max_active and groups by this number. The threads that ran bodies can be more.
     workers_ = options_.threads > 0 ? options_.threads : workload_.platform.workers;
     if (has_one_thread(options_.executor)) workers_ = 1;
+    if (is_isolated()) workers_ = number_of_tasks(workload_);
     workload_.platform.workers = workers_;
   }
 
@@ -65,6 +86,7 @@ class Run {
     if (auto possible = look_at_limits(); !possible) return tl::unexpected(possible.error());
     NodesOptions nodes;
     nodes.seed = options_.seed;
+    nodes.first_task = first_task_;
     nodes.intra_process = options_.intra_process;
     nodes.redag = is_redag(options_.executor);
     nodes.threads = workers_ + (nodes.redag ? kSpareThreads : 0) + 1;
@@ -73,16 +95,24 @@ class Run {
     if (auto connected = nodes_->connect(kConnectTimeout); !connected) return tl::unexpected(connected.error());
     try {
       make_executor();
+      if (is_isolated()) configurator_ = std::make_unique<ThreadConfigurator>(nodes_->nodes(), isolated_nodes());
     } catch (const std::runtime_error &error) {  // this process may not have the requested preemption
       return redag::make_error(error.what(), options_.executor == "redag-os" ? redag::runtime::realtime_hint() : "");
     }
     if (preempts_by_priority()) nodes_->note_absences();
-    nodes_->arm(timer_clock_now() + kStartMargin);
+    if (is_isolated()) {
+      const std::size_t processes = options_.only_dag > 0 ? whole_.dags.size() : 1;
+      if (auto listen = configurator_->wait_until_they_listen(processes, kConnectTimeout); !listen) {
+        return tl::unexpected(listen.error());
+      }
+    }
+    if (auto armed = arm(); !armed) return tl::unexpected(armed.error());
     const Duration cost = nodes_->measurement_cost();
     for (const auto &node : nodes_->nodes()) executor_->add_node(node);
     std::thread spinning([this] { spin(); });
     collect_and_end();
     spinning.join();
+    if (!configured_) return tl::unexpected(configured_.error());
     if (const auto failure = failure_text()) return redag::make_error(fmt::format("the executor failed: {}", *failure));
     collect();
     describe_run(cost);
@@ -109,6 +139,14 @@ class Run {
     return {};
   }
 
+  redag::Result<void> arm() {
+    if (!options_.start) {
+      nodes_->arm(timer_clock_now() + kStartMargin);
+      return {};
+    }
+    return options_.start().map([this](Time start) { nodes_->arm(start); });
+  }
+
   void make_executor() {
     const std::string &name = options_.executor;
     if (is_redag(name)) {
@@ -120,11 +158,36 @@ class Run {
       redag.threads = workers_ + kSpareThreads;
       redag.workload = nodes_->bound_workload();
       redag.trace_capacity = kSchedulerEvents;
+      redag.share_order = options_.only_dag > 0 && can_be_os(redag.preemption);
       redag_ = std::make_shared<ReDAGExecutor>(redag);
       executor_ = redag_;
+    } else if (is_isolated()) {
+      executor_ = make_isolated();
     } else {
       executor_ = make_peer(name, workers_);
     }
+  }
+
+  [[nodiscard]] bool is_isolated() const { return options_.executor == kIsolated; }
+
+  // For CIE's threads the priorities that ReDAGExecutor gives to the same callbacks in one process: those of the order
+  // of the whole workload.
+  [[nodiscard]] std::map<std::string, IsolatedNode> isolated_nodes() const {
+    const std::vector<redag::sched::Priority> order =
+        redag::sched::assign_priorities(whole_.dags, whole_.policy, whole_.ties);
+    const redag::runtime::PriorityBand band = redag::runtime::probe_priority_band();
+    std::map<std::string, IsolatedNode> nodes;
+    std::size_t next = first_task_;
+    const redag::Workload bound = nodes_->bound_workload();
+    for (std::size_t dag = 0; dag < workload_.dags.size(); ++dag) {
+      for (std::size_t i = 0; i < workload_.dags[dag].tasks.size(); ++i) {
+        const redag::Task &task = bound.dags[dag].tasks[i];
+        IsolatedNode &node = nodes[task.callback->node];
+        node.priority = std::max(node.priority, band.of_level(order[next++].level));
+        if (task.activation == redag::Activation::Timer) node.timers.push_back(task.period);
+      }
+    }
+    return nodes;
   }
 
   void spin() {
@@ -157,13 +220,16 @@ class Run {
   // A priority above the threads that execute bodies, which under overload leave no time to others. With os these
   // threads have priorities of their own. Under chrt they have this thread's priority.
   [[nodiscard]] int collecting_priority() const {
-    return preempts_by_priority() ? redag::runtime::probe_priority_band().top_job + 1
-                                  : redag::runtime::fifo_priority_above_this_thread();
+    return preempts_by_priority() || is_isolated() ? redag::runtime::probe_priority_band().top_job + 1
+                                                   : redag::runtime::fifo_priority_above_this_thread();
   }
 
   void collect_and_end() {
     const RaisedThread raised(collecting_priority());
-    collect_until_end();
+    if (configurator_ != nullptr) {
+      configured_ = configurator_->wait_for_priorities(timer_clock_now() - nodes_->now());  // until time 0
+    }
+    if (configured_) collect_until_end();
     nodes_->halt();
     if (!nodes_->wait_idle(timer_clock_now() + kDrainTimeout)) {
       nodes_->give_up();
@@ -174,6 +240,7 @@ class Run {
     // ReDAGExecutor, where cancel() is not virtual.
     while (!spin_ended_) {
       executor_->cancel();
+      if (is_isolated()) rclcpp::shutdown();  // its threads do not hear of cancel()
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
   }
@@ -241,13 +308,17 @@ class Run {
     result_.scheduler = std::move(scheduler);
   }
 
-  redag::Workload workload_;
+  const redag::Workload &whole_;
+  redag::Workload workload_;      // what this process runs of it
+  std::uint32_t first_task_ = 0;  // TaskId of its first task in the whole
   const WorkloadRunOptions &options_;
   std::uint32_t workers_ = 1;
   WorkloadRun result_;
   std::unique_ptr<WorkloadNodes> nodes_;
   std::shared_ptr<rclcpp::Executor> executor_;  // declared after the nodes: destroyed before them
   std::shared_ptr<ReDAGExecutor> redag_;        // the same object, if it is a ReDAGExecutor
+  std::unique_ptr<ThreadConfigurator> configurator_;
+  redag::Result<void> configured_;
   std::vector<JobEvent> bodies_;
   std::vector<JobEvent> decisions_;
   Time end_ = 0;
@@ -262,6 +333,7 @@ const std::vector<std::string> &executor_names() {
   static const std::vector<std::string> kNames = [] {
     std::vector<std::string> all = {"redag", "redag-none", "redag-cooperative", "redag-os"};
     all.insert(all.end(), peer_names().begin(), peer_names().end());
+    all.emplace_back(kIsolated);
     return all;
   }();
   return kNames;
@@ -273,6 +345,7 @@ redag::Result<void> check_executor(const std::string &name) {
     return redag::make_error(fmt::format("there is no executor '{}'", name),
                              fmt::format("one of {}", fmt::join(names, ", ")));
   }
+  if (name == kIsolated) return check_isolated();
   return is_redag(name) ? redag::Result<void>() : check_peer(name);
 }
 

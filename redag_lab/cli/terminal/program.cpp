@@ -105,7 +105,8 @@ constexpr std::array kCommands = {
           "  redag merge-traces --host vision=results/vision --host drive=results/drive \\\n"
           "    --offset vision=0 --offset drive=1.25ms+-80us --out results/robot\n"
           "  redag merge-traces --host vision=results/vision --host drive=results/drive \\\n"
-          "    --clock vision=examples/hosts/vision.txt --clock drive=examples/hosts/drive.txt \\\n"
+          "    --clock vision=examples/hosts/vision.txt \\\n"
+          "    --clock drive=examples/hosts/drive.txt \\\n"
           "    --robot examples/hosts/robot.yaml --out results/robot\n"},
     Entry{"why", "Explain why deadlines of a recorded run were missed", add_why,
           "  redag why results/demo\n"
