@@ -28,6 +28,7 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::StartsWith;
 using Strings = std::vector<std::string>;
 
 class StackComparisonTest : public ::testing::Test {
@@ -111,14 +112,17 @@ TEST_F(StackComparisonTest, BadOptionsAreNamed) {
       {{"--rate", "nan"}, "--rate: 'nan' is not a number of at least 0.001"},
       {{"--width", "-1"}, "--width: '-1' is not a whole number from 1 to 1000"},
       {{"--width", "1001"}, "--width: '1001' is not a whole number from 1 to 1000"},
-      {{"--height", "3"}, "The following arguments were not expected: --height 3"},
-      {{"--rounds"}, "--rounds requires 1 argument"},
       {{"--only", "plain,other"}, "--only: other not in {plain,redag}"},
       {{"--config", "/nowhere/x.yaml"}, "--config: there is no file '/nowhere/x.yaml'"},
   };
   for (const auto &[arguments, message] : cases) {
     EXPECT_EQ(run(arguments), 2) << message;
     EXPECT_EQ(complained_, "error: " + message + " ('bench_test --help' lists the options)\n");
+  }
+  // These words are CLI11's, which has others in each version.
+  for (const Strings &arguments : {Strings{"--height", "3"}, Strings{"--rounds"}}) {
+    EXPECT_EQ(run(arguments), 2);
+    EXPECT_THAT(complained_, AllOf(StartsWith("error: "), HasSubstr(arguments.front())));
   }
   EXPECT_THAT(runs_, IsEmpty());
 }
