@@ -7,6 +7,7 @@
 
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "redag/base/result.hpp"
 #include "redag_analysis/metrics/kernel_record.hpp"
@@ -14,11 +15,11 @@
 
 namespace redag::hosts {
 
-/// Finds the record beside each run's events. Other members are those of the merged run's host.
+/// The record of one host, and what its numbers become in the merged one.
 struct HostKernel {
-  const Host *host = nullptr;
+  const Host *host = nullptr;  // of the merged run
   metrics::KernelRecord record;
-  int first_cpu = 0;
+  int first_cpu = 0;     // added to numbers of processors
   int first_thread = 0;  // added to numbers of threads, except 0
 
   /// Its row in the merged record.

@@ -109,7 +109,7 @@ bool is_result_name(std::string_view name) {
   if (const std::size_t at = name.rfind(".tmp."); at != std::string_view::npos && is_number(name.substr(at + 5))) {
     name = name.substr(0, at);
   }
-  constexpr std::array<std::string_view, 35> kNames = {"jobs.csv",
+  constexpr std::array<std::string_view, 36> kNames = {"jobs.csv",
                                                        "summary.json",
                                                        "hosts.json",
                                                        "trace.pftrace",
@@ -143,6 +143,7 @@ bool is_result_name(std::string_view name) {
                                                        "shards",
                                                        "merged",
                                                        "logs",
+                                                       "kernel.jsonl",  // of earlier versions
                                                        "kernel.jsonl.gz"};
   if (std::find(kNames.begin(), kNames.end(), name) != kNames.end()) return true;
   // Folders of a comparison (executors, and repetitions below them), and the files of `generate`.
