@@ -39,7 +39,8 @@ SYSTEM_KEYS = {
 # Packages of the distributions themselves: ros-<distribution>-<name>.
 ROS_KEYS = {"ament_cmake", "ament_index_python", "composition_interfaces", "diagnostic_msgs", "launch", "launch_ros", "rcl",
             "pal_statistics_msgs", "rcl_interfaces", "rclcpp", "rclcpp_action", "rclcpp_components", "rclcpp_lifecycle", "rcutils", "rmw",
-            "ros2cli", "rosgraph_msgs", "std_msgs", "std_srvs", "test_msgs", "tracetools"}
+            "ros2cli", "rosbag2_compression", "rosbag2_compression_zstd", "rosbag2_cpp", "rosbag2_storage",
+            "rosbag2_storage_default_plugins", "rosgraph_msgs", "std_msgs", "std_srvs", "test_msgs", "tracetools"}
 # Names that find_package() looks for, with the rosdep key that installs them. The C library has the threads,
 # and packages are built without MPI, Prometheus and LTTng.
 CMAKE_PACKAGES = {"fmt": "fmt", "nlohmann_json": "nlohmann-json-dev", "tl-expected": "libexpected-dev",

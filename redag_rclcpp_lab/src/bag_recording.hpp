@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Opens bags of rosbag2 in its SQLite storage (.db3), without rosbag2.
+// Opens bags with rosbag2's own reader. Hence every storage and compression works whose plugin is installed.
 #pragma once
 
 #include <memory>
@@ -12,8 +12,9 @@
 
 namespace redag_rclcpp::lab {
 
-/// `path`: a .db3 file, or the folder of a bag. `topics`: those to read; empty: all but /clock. Errors say what to do:
-/// other storages and compressed bags can be converted.
+/// `path`: the folder of a bag, or one of its files. `topics`: those to read; empty: all but /clock. Messages come one
+/// at a time, hence the memory does not depend on the length of the bag. A message that rosbag2 returns after later
+/// ones (files of a split bag can overlap by the recorder's cache) gets their time, so that time never goes back.
 [[nodiscard]] redag::Result<std::unique_ptr<Recording>> open_bag(const std::string &path,
                                                                  const std::set<std::string> &topics);
 

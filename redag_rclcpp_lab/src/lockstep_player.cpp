@@ -67,6 +67,7 @@ Result<PlayResult> LockstepPlayer::play(Recording &recording) {
   if (done) done = connect();
   for (std::uint32_t i = 0; done && !result_.stopped && i < options_.repeat; ++i) {
     if (i > 0) done = recording.rewind();
+    if (!done) is_recording_bad_ = true;
     if (done) done = play_once(recording);
   }
   if (rclcpp::ok(node_->get_node_base_interface()->get_context())) {
@@ -85,6 +86,7 @@ Result<void> LockstepPlayer::advertise(const Recording &recording) {
     try {
       topics_.push_back({topic.name, node_->create_generic_publisher(topic.name, topic.type, qos)});
     } catch (const std::exception &error) {
+      is_recording_bad_ = true;
       return redag::make_error(fmt::format("cannot publish '{}' of type {}: {}", topic.name, topic.type, error.what()),
                                fmt::format("source the workspace with the package {}, or leave the topic out with "
                                            "--topics",
@@ -183,12 +185,21 @@ void LockstepPlayer::announce(Order::Kind kind) {
 
 // ---- instants ----
 
+Result<bool> LockstepPlayer::read(Recording &recording, RecordedMessage &message) {
+  Result<bool> has_one = recording.next(message);
+  if (!has_one) is_recording_bad_ = true;
+  return has_one;
+}
+
 // An instant for each time of a message, and for each tick.
 Result<void> LockstepPlayer::play_once(Recording &recording) {
   RecordedMessage next;
-  Result<bool> has_next = recording.next(next);
+  Result<bool> has_next = read(recording, next);
   if (!has_next) return tl::unexpected(has_next.error());
-  if (!*has_next) return redag::make_error("the recording has no messages");
+  if (!*has_next) {
+    is_recording_bad_ = true;
+    return redag::make_error("the recording has no messages");
+  }
   first_ = next.time;
   begun_ = redag::kNever;
   const Time began = monotonic_now();
@@ -200,7 +211,7 @@ Result<void> LockstepPlayer::play_once(Recording &recording) {
     while (*has_next && next.time == time) {
       messages.push_back(std::move(next));
       next = RecordedMessage();
-      has_next = recording.next(next);
+      has_next = read(recording, next);
       if (!has_next) return tl::unexpected(has_next.error());
     }
     if (time == tick) tick += options_.tick;

@@ -63,6 +63,9 @@ class LockstepPlayer {
   /// Plays the recording to its end. Errors say which executor failed, why, and what helps.
   [[nodiscard]] redag::Result<PlayResult> play(Recording &recording);
 
+  /// True if play() failed because of the recording, and not of an executor.
+  [[nodiscard]] bool is_recording_bad() const { return is_recording_bad_; }
+
  private:
   using Report = lockstep::Report;
   struct Topic {
@@ -74,6 +77,7 @@ class LockstepPlayer {
   [[nodiscard]] redag::Result<void> advertise(const Recording &recording);
   [[nodiscard]] redag::Result<void> connect();
   [[nodiscard]] redag::Result<void> play_once(Recording &recording);
+  [[nodiscard]] redag::Result<bool> read(Recording &recording, RecordedMessage &message);
   [[nodiscard]] redag::Result<void> step(redag::Time time, std::vector<RecordedMessage> &messages);
   [[nodiscard]] redag::Result<void> await_end_of_instant();
   [[nodiscard]] redag::Result<void> check(std::uint32_t &done);
@@ -96,6 +100,7 @@ class LockstepPlayer {
   PlayResult result_;
   redag::Rng random_;
   bool paused_ = false;
+  bool is_recording_bad_ = false;
   bool complete_ = false;              // all executors are known; others come too late
   redag::Time begun_ = redag::kNever;  // CLOCK_MONOTONIC; when the recording's first instant was due
   redag::Time first_ = 0;              // that instant's time

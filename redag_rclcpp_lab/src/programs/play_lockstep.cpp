@@ -12,12 +12,14 @@
 #include <utility>
 #include <vector>
 
-#include "bag_recording.hpp"
 #include "command_line.hpp"
 #include "lockstep_player.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "redag/base/check.hpp"
 #include "redag/base/text.hpp"
+#ifdef REDAG_ROSBAG2
+#include "bag_recording.hpp"
+#endif
 
 namespace redag_rclcpp::lab {
 namespace {
@@ -52,7 +54,7 @@ volatile std::sig_atomic_t interrupted = 0;
 
 void add_options(CLI::App &app, Arguments &arguments) {
   PlayOptions &play = arguments.play;
-  app.add_option("BAG", arguments.bag, "A bag of rosbag2 with the storage sqlite3: its\nfolder, or a .db3 file")
+  app.add_option("BAG", arguments.bag, "A bag of rosbag2: its folder, or one of its files")
       ->type_name("PATH")
       ->required();
   add_number<std::uint32_t>(app, "--executors", play.executors, 0,
@@ -115,9 +117,17 @@ int report(const PlayResult &result) {
   return repeats ? kExitOk : kExitNo;
 }
 
+Result<std::unique_ptr<Recording>> open(const Arguments &arguments) {
+#ifdef REDAG_ROSBAG2
+  return open_bag(arguments.bag, {arguments.topics.begin(), arguments.topics.end()});
+#else
+  return redag::make_error(fmt::format("cannot read '{}': this play_lockstep was built without rosbag2", arguments.bag),
+                           "install rosbag2_compression of your distribution, and build redag_rclcpp_lab again");
+#endif
+}
+
 int run(const Arguments &arguments) {
-  Result<std::unique_ptr<Recording>> recording =
-      open_bag(arguments.bag, {arguments.topics.begin(), arguments.topics.end()});
+  const Result<std::unique_ptr<Recording>> recording = open(arguments);
   if (!recording) {
     fmt::print(stderr, "play_lockstep: {}\n", to_string(recording.error()));
     return kExitBad;
@@ -141,7 +151,7 @@ int run(const Arguments &arguments) {
   const Result<PlayResult> result = player.play(**recording);
   if (!result) {
     fmt::print(stderr, "play_lockstep: {}\n", to_string(result.error()));
-    return kExitNo;
+    return player.is_recording_bad() ? kExitBad : kExitNo;
   }
   return report(*result);
 }
