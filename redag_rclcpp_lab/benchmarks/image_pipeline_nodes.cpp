@@ -1,15 +1,13 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The components around image_proc's for bench_image_pipeline: a synthetic camera, a viewer that measures how old its
-// frames are, and a control loop that measures how late it is called. The viewer and the control loop write their
-// figures as JSON to the file `report` when they are destroyed. They leave out the first `warm_up` seconds.
+// The components around image_proc's for bench_image_pipeline: a synthetic camera, and a viewer that measures how old
+// its frames are. The viewer writes its figures as JSON to the file `report` when it is destroyed. It leaves out the
+// first `warm_up` seconds.
 #include <chrono>
 #include <cmath>
 #include <cstdint>
-#include <fstream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -21,6 +19,7 @@
 #include "sensor_msgs/image_encodings.hpp"
 #include "sensor_msgs/msg/camera_info.hpp"
 #include "sensor_msgs/msg/image.hpp"
+#include "stack_nodes.hpp"
 #include "timer_grid.hpp"
 
 namespace redag_rclcpp::lab {
@@ -30,26 +29,6 @@ using redag::Time;
 using redag::runtime::monotonic_now;
 using sensor_msgs::msg::CameraInfo;
 using sensor_msgs::msg::Image;
-
-namespace {
-
-Duration read_seconds(rclcpp::Node &node, const char *name, double initial) {
-  return std::llround(node.declare_parameter<double>(name, initial) * static_cast<double>(redag::kSecond));
-}
-
-/// In milliseconds; empty without samples.
-nlohmann::json summary(const Samples &samples) {
-  if (samples.size() == 0) return nlohmann::json::object();
-  return {{"p50", samples.milliseconds(0.5)}, {"p99", samples.milliseconds(0.99)}, {"max", samples.milliseconds(1)}};
-}
-
-void write_report(const rclcpp::Node &node, const std::string &file, const nlohmann::json &figures) {
-  std::ofstream out(file);
-  out << figures << "\n";
-  if (!out.flush()) RCLCPP_ERROR(node.get_logger(), "cannot write the parameter report's file '%s'", file.c_str());
-}
-
-}  // namespace
 
 /// Publishes `image_raw` (a Bayer pattern) and `camera_info` (of a lens with distortion) every `period` seconds. A
 /// frame's stamp is the time at which the timer should have called.
@@ -147,53 +126,7 @@ class Viewer : public rclcpp::Node {
   rclcpp::Subscription<Image>::SharedPtr subscription_;
 };
 
-/// A timer of `period` seconds, each call of which uses the processor for `load` seconds. Reports how late it was
-/// called, and the points of its grid that it missed: those that no call was for, and calls that ended after the next
-/// point.
-class Control : public rclcpp::Node {
- public:
-  explicit Control(const rclcpp::NodeOptions &options)
-      : Node("control", options),
-        period_(read_seconds(*this, "period", 0.002)),
-        load_(read_seconds(*this, "load", 0.0003)),
-        warm_up_(read_seconds(*this, "warm_up", 2)),
-        report_(declare_parameter<std::string>("report", "")),
-        grid_(period_),
-        timer_(create_wall_timer(std::chrono::nanoseconds(period_), [this] { control(); })) {}
-  Control(const Control &) = delete;
-  Control &operator=(const Control &) = delete;
-
-  ~Control() override {
-    if (report_.empty()) return;
-    write_report(*this, report_, {{"points", points_}, {"missed", missed_}, {"lateness", summary(latenesses_)}});
-  }
-
- private:
-  void control() {
-    const TimerCall call = grid_.next(*timer_);
-    const Time start = monotonic_now();
-    use_processor(load_);
-    if (!begin_) begin_ = start + warm_up_;
-    if (start < *begin_) return;
-    points_ += call.skipped + 1;
-    missed_ += call.skipped + (monotonic_now() > call.nominal + period_ ? 1 : 0);
-    latenesses_.add(call.lateness);
-  }
-
-  Duration period_;
-  Duration load_;
-  Duration warm_up_;
-  std::string report_;
-  TimerGrid grid_;
-  std::optional<Time> begin_;
-  std::int64_t points_ = 0;
-  std::int64_t missed_ = 0;
-  Samples latenesses_;
-  rclcpp::TimerBase::SharedPtr timer_;
-};
-
 }  // namespace redag_rclcpp::lab
 
 RCLCPP_COMPONENTS_REGISTER_NODE(redag_rclcpp::lab::Camera)
 RCLCPP_COMPONENTS_REGISTER_NODE(redag_rclcpp::lab::Viewer)
-RCLCPP_COMPONENTS_REGISTER_NODE(redag_rclcpp::lab::Control)

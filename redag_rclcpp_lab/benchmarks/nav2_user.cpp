@@ -1,0 +1,137 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+#include "nav2_user.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <stdexcept>
+#include <thread>
+
+#include "nav2_world.hpp"
+#include "redag/runtime/clock.hpp"
+
+namespace redag_rclcpp::lab {
+
+using nav_msgs::msg::OccupancyGrid;
+using nav_msgs::msg::Path;
+using redag::Duration;
+using redag::Time;
+using redag::runtime::monotonic_now;
+using std_srvs::srv::Trigger;
+
+namespace {
+
+constexpr std::chrono::seconds kLimit(30);  // of an answer
+constexpr std::chrono::seconds kStartLimit(90);
+constexpr std::chrono::milliseconds kReplan(500);
+
+}  // namespace
+
+NavigationUser::NavigationUser()
+    : node_(std::make_shared<rclcpp::Node>("bench_nav2")),
+      is_active_(node_->create_client<Trigger>("/lifecycle_manager/is_active")),
+      planner_(rclcpp_action::create_client<Plan>(node_, "/compute_path_to_pose")),
+      controller_(rclcpp_action::create_client<Follow>(node_, "/follow_path")),
+      costmaps_(node_->create_subscription<OccupancyGrid>(
+          "/local_costmap/costmap", 10, [this](OccupancyGrid::ConstSharedPtr costmap) {
+            if (monotonic_now() < begin_) return;
+            costmap_stamps_.push_back(rclcpp::Time(costmap->header.stamp).nanoseconds());
+          })) {
+  executor_.add_node(node_);
+}
+
+template <class Future>
+void NavigationUser::await(const Future &future, const char *what) {
+  if (executor_.spin_until_future_complete(future, kLimit) != rclcpp::FutureReturnCode::SUCCESS) {
+    throw std::runtime_error(fmt::format("no answer from {}", what));
+  }
+}
+
+void NavigationUser::await_active() {
+  const auto limit = std::chrono::steady_clock::now() + kStartLimit;
+  while (std::chrono::steady_clock::now() < limit) {
+    // The service answers once all servers have been activated, or if one of them failed.
+    if (is_active_->wait_for_service(std::chrono::milliseconds(100))) {
+      auto answer = is_active_->async_send_request(std::make_shared<Trigger::Request>());
+      if (executor_.spin_until_future_complete(answer, std::chrono::seconds(1)) == rclcpp::FutureReturnCode::SUCCESS &&
+          answer.get()->success) {
+        return;
+      }
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  throw std::runtime_error(fmt::format("Nav2 is not active after {} s", kStartLimit.count()));
+}
+
+Path NavigationUser::plan(std::size_t place) {
+  const hall::Point &point = hall::kPlaces.at(place);
+  Plan::Goal goal;
+  goal.goal.header.frame_id = "map";
+  goal.goal.pose.position.x = point.x;
+  goal.goal.pose.position.y = point.y;
+  goal.goal.pose.orientation.w = 1;
+  const Time sent = monotonic_now();
+  auto accepted = planner_->async_send_goal(goal);
+  await(accepted, "/compute_path_to_pose");
+  if (!accepted.get()) throw std::runtime_error("/compute_path_to_pose refused a goal");
+  auto result = planner_->async_get_result(accepted.get());
+  await(result, "/compute_path_to_pose");
+  const bool planned = result.get().code == rclcpp_action::ResultCode::SUCCEEDED;
+  if (sent >= begin_ && planned) plans_.add(monotonic_now() - sent);
+  if (sent >= begin_ && !planned) ++unplanned_;
+  return planned ? result.get().result->path : Path();
+}
+
+NavigationUser::FollowResult NavigationUser::follow(const Path &path) {
+  Follow::Goal goal;
+  goal.path = path;
+  auto accepted = controller_->async_send_goal(goal);
+  await(accepted, "/follow_path");
+  if (!accepted.get()) throw std::runtime_error("/follow_path refused a goal");
+  return controller_->async_get_result(accepted.get());
+}
+
+void NavigationUser::drive(Time begin, Time end) {
+  begin_ = begin;
+  if (!planner_->wait_for_action_server(kLimit) || !controller_->wait_for_action_server(kLimit)) {
+    throw std::runtime_error("Nav2 offers no actions");
+  }
+  for (std::size_t place = 0; monotonic_now() < end; place = (place + 1) % hall::kPlaces.size()) {
+    FollowResult result;
+    do {
+      if (const Path path = plan(place); !path.poses.empty()) result = follow(path);
+      if (!result.valid()) {  // no plan to begin with
+        executor_.spin_some();
+        std::this_thread::sleep_for(kReplan);
+        continue;
+      }
+    } while (monotonic_now() < end && (!result.valid() || executor_.spin_until_future_complete(result, kReplan) !=
+                                                              rclcpp::FutureReturnCode::SUCCESS));
+    const bool over = result.valid() && result.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+    if (!over || monotonic_now() < begin_) continue;
+    ++(result.get().code == rclcpp_action::ResultCode::SUCCEEDED ? reached_ : failed_);
+  }
+}
+
+void NavigationUser::report(Figures &figures, double update_rate) const {
+  figures["places reached"] = reached_;
+  figures["places not reached"] = failed_;
+  figures["plans failed"] = unplanned_;
+  if (plans_.size() > 0) {
+    figures["plan done after, ms, p50"] = plans_.milliseconds(0.5);
+    figures["plan done after, ms, p99"] = plans_.milliseconds(0.99);
+  }
+  Samples off;
+  const auto period = static_cast<double>(redag::kSecond) / update_rate;
+  for (std::size_t i = 1; i < costmap_stamps_.size(); ++i) {
+    off.add(std::llround(std::abs(static_cast<double>(costmap_stamps_[i] - costmap_stamps_[i - 1]) - period)));
+  }
+  if (off.size() == 0) throw std::runtime_error("the local costmap was not published");
+  figures["costmap interval off, ms, p50"] = off.milliseconds(0.5);
+  figures["costmap interval off, ms, p99"] = off.milliseconds(0.99);
+}
+
+}  // namespace redag_rclcpp::lab
