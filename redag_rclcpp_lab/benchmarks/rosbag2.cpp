@@ -42,7 +42,7 @@ using sensor_msgs::msg::Image;
 using sensor_msgs::msg::Imu;
 using Seconds = std::chrono::duration<double>;
 
-constexpr double kWarmUp = 2;         // seconds at the start that are left out
+constexpr double kWarmUp = 2;          // seconds at the start that are left out
 constexpr double kReplayedRate = 100;  // messages a second of the bag that is played
 
 constexpr const char *kDescription = "Compares component containers on rosbag2's Recorder and Player.\n";
@@ -99,18 +99,19 @@ std::vector<Component> components(const Setting &setting, const std::string &fol
       {"rosbag2_transport",
        "rosbag2_transport::Recorder",
        {},
-       {rclcpp::Parameter("storage.uri", folder + "/recorded"), rclcpp::Parameter("storage.storage_id", setting.storage),
-        rclcpp::Parameter("record.topics", topics), rclcpp::Parameter("record.disable_keyboard_controls", true)}},
+       {rclcpp::Parameter("storage.uri", folder + "/recorded"),
+        rclcpp::Parameter("storage.storage_id", setting.storage), rclcpp::Parameter("record.topics", topics),
+        rclcpp::Parameter("record.disable_keyboard_controls", true)}},
       {own,
        "redag_rclcpp::lab::Control",
        {},
        {rclcpp::Parameter("period", 1 / setting.control), warm_up, rclcpp::Parameter("report", folder + "/control")}}};
   if (setting.play) {
-    all.push_back({own,
-                   "redag_rclcpp::lab::Listener",
-                   {},
-                   {rclcpp::Parameter("period", 1 / kReplayedRate), warm_up,
-                    rclcpp::Parameter("report", folder + "/listener")}});
+    all.push_back(
+        {own,
+         "redag_rclcpp::lab::Listener",
+         {},
+         {rclcpp::Parameter("period", 1 / kReplayedRate), warm_up, rclcpp::Parameter("report", folder + "/listener")}});
     all.push_back({"rosbag2_transport",
                    "rosbag2_transport::Player",
                    {},

@@ -74,9 +74,9 @@ class Bag final : public Recording {
       ++read_;
       const auto topic = index_.find(recorded->topic_name);
       if (topic == index_.end()) {
-        return redag::make_error(fmt::format("{}: a message of '{}', which the bag does not list", path_,
-                                             recorded->topic_name),
-                                 "'ros2 bag reindex' makes the list again");
+        return redag::make_error(
+            fmt::format("{}: a message of '{}', which the bag does not list", path_, recorded->topic_name),
+            "'ros2 bag reindex' makes the list again");
       }
       message.topic = topic->second;
       message.time = latest_ = std::max(latest_, recorded_at(*recorded));
@@ -105,7 +105,8 @@ class Bag final : public Recording {
           fmt::format("cannot read the bag '{}': {}", path_, error.what()),
           storage.empty()
               ? "the file is damaged, or the plugin of its storage is not installed, such as rosbag2_storage_mcap"
-              : fmt::format("rosbag2 needs all files of the bag, undamaged, and the plugin of its storage '{}'{}", storage,
+              : fmt::format("rosbag2 needs all files of the bag, undamaged, and the plugin of its storage '{}'{}",
+                            storage,
                             metadata_->compression_format.empty()
                                 ? ""
                                 : fmt::format(" and of its compression '{}'", metadata_->compression_format)));
@@ -116,8 +117,8 @@ class Bag final : public Recording {
   [[nodiscard]] Result<void> start() {
     return reading([&]() -> Result<void> {
       if (metadata_ && !metadata_->compression_format.empty()) {
-        reader_ = std::make_unique<rosbag2_cpp::Reader>(
-            std::make_unique<rosbag2_compression::SequentialCompressionReader>());
+        reader_ =
+            std::make_unique<rosbag2_cpp::Reader>(std::make_unique<rosbag2_compression::SequentialCompressionReader>());
       } else {
         reader_ = std::make_unique<rosbag2_cpp::Reader>(std::make_unique<rosbag2_cpp::readers::SequentialReader>());
       }
@@ -141,8 +142,7 @@ class Bag final : public Recording {
             "only cdr can be played; leave the topic out with --topics");
       }
       index_[topic.name] = topics_.size();
-      topics_.push_back(
-          {.name = topic.name, .type = topic.type, .latched = is_latched(topic.offered_qos_profiles)});
+      topics_.push_back({.name = topic.name, .type = topic.type, .latched = is_latched(topic.offered_qos_profiles)});
       expected_ += recorded.message_count;
     }
     if (!lacking.empty()) {
@@ -192,7 +192,8 @@ Result<std::unique_ptr<Recording>> open_bag(const std::string &path, const std::
   std::error_code error;
   const bool is_folder = fs::is_directory(path, error);
   if (!is_folder && !fs::is_regular_file(path, error)) {
-    return redag::make_error(fmt::format("there is no bag '{}'", path), "give the folder of a bag, or one of its files");
+    return redag::make_error(fmt::format("there is no bag '{}'", path),
+                             "give the folder of a bag, or one of its files");
   }
   Result<std::optional<rosbag2_storage::BagMetadata>> metadata =
       metadata_of(is_folder ? fs::path(path) : fs::absolute(path).parent_path());

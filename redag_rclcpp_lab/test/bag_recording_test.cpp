@@ -111,13 +111,14 @@ TEST_P(BagFormats, AreReadTwiceAndByTopic) {
   EXPECT_THAT(refusal(bag.path(), {"/clock"}), HasSubstr("has no messages of these topics"));
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    All, BagFormats,
-    testing::Values(BagFormat{"mcap"}, BagFormat{"sqlite3"}, BagFormat{"mcap", "", 1}, BagFormat{"sqlite3", "", 1},
-                    BagFormat{"mcap", "message"}, BagFormat{"sqlite3", "file"}),
-    [](const auto &given) {
-      return given.param.storage + given.param.compression + (given.param.split_after > 0 ? "split" : "");
-    });
+INSTANTIATE_TEST_SUITE_P(All, BagFormats,
+                         testing::Values(BagFormat{"mcap"}, BagFormat{"sqlite3"}, BagFormat{"mcap", "", 1},
+                                         BagFormat{"sqlite3", "", 1}, BagFormat{"mcap", "message"},
+                                         BagFormat{"sqlite3", "file"}),
+                         [](const auto &given) {
+                           return given.param.storage + given.param.compression +
+                                  (given.param.split_after > 0 ? "split" : "");
+                         });
 
 class BagStorages : public testing::TestWithParam<std::pair<std::string, std::string>> {};
 
@@ -143,7 +144,8 @@ TEST_P(BagStorages, RefuseWhatIsNoBag) {
   // What a full disk or a broken copy leaves.
   std::filesystem::resize_file(file, std::filesystem::file_size(file) * 2 / 3);
   EXPECT_THAT(error_at_the_end(bag.path()), AllOf(HasSubstr(bag.path()), HasSubstr("damaged")));
-  bag.write(file.filename().c_str(), "this is no bag, but long enough to be looked at as one: " + std::string(200, '-'));
+  bag.write(file.filename().c_str(),
+            "this is no bag, but long enough to be looked at as one: " + std::string(200, '-'));
   EXPECT_THAT(error_at_the_end(bag.path()), AllOf(HasSubstr(bag.path()), HasSubstr("undamaged")));
   EXPECT_THAT(error_at_the_end(file.string()), AllOf(HasSubstr(file.string()), HasSubstr("damaged")));
   std::filesystem::remove(file);
@@ -168,8 +170,7 @@ TEST_P(BagStorages, TimeDoesNotGoBackWhereFilesOverlap) {
   EXPECT_THAT(times, testing::ElementsAre(at(0), at(950), at(950), at(1200)));
 }
 
-INSTANTIATE_TEST_SUITE_P(All, BagStorages,
-                         testing::Values(std::pair("mcap", ".mcap"), std::pair("sqlite3", ".db3")),
+INSTANTIATE_TEST_SUITE_P(All, BagStorages, testing::Values(std::pair("mcap", ".mcap"), std::pair("sqlite3", ".db3")),
                          [](const auto &given) { return given.param.first; });
 
 TEST(BagRecording, FilesOfACompressedBagNeedItsFolder) {

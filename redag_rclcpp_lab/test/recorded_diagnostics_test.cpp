@@ -81,8 +81,8 @@ TEST(RecordedDiagnostics, TellOfMisses) {
     const auto timer = robot->create_wall_timer(10ms, [&] { std::this_thread::sleep_for(slow ? 35ms : 0ms); });
     const auto watcher = std::make_shared<rclcpp::Node>("watcher");
     std::atomic<int> seen = 0;
-    const auto subscription = watcher->create_subscription<DiagnosticArray>(
-        "/diagnostics", 10, [&](const DiagnosticArray &) { ++seen; });
+    const auto subscription =
+        watcher->create_subscription<DiagnosticArray>("/diagnostics", 10, [&](const DiagnosticArray &) { ++seen; });
     executor.add_node(watcher);
     Monitor monitor(robot, executor, monitored);
     std::thread spinner([&] { executor.spin(); });

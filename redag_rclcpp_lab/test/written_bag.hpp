@@ -29,7 +29,7 @@ namespace redag_rclcpp::lab {
 
 struct BagFormat {
   std::string storage = "mcap";
-  std::string compression{};       // of rosbag2: "", "message" or "file"
+  std::string compression{};      // of rosbag2: "", "message" or "file"
   std::uint64_t split_after = 0;  // seconds; 0: one file
 };
 
