@@ -6,6 +6,8 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <pthread.h>
+#include <sched.h>
 #include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
@@ -103,6 +105,7 @@ class ContainerTest : public ::testing::Test {
     for (const char *name : {"Sensor", "Filter", "Control", "Map", "Planner"}) {
       components << "redag_rclcpp::examples::" << name << ";" << COMPONENTS << "\n";
     }
+    components << "redag_rclcpp::Threaded;" << THREADED << "\n";
     const char *prefixes = std::getenv("AMENT_PREFIX_PATH");
     setenv("AMENT_PREFIX_PATH", (folder_.string() + ":" + (prefixes ? prefixes : "")).c_str(), 1);
     rclcpp::init(0, nullptr);
@@ -145,10 +148,11 @@ class ContainerTest : public ::testing::Test {
     return nullptr;
   }
 
-  LoadNode::Response::SharedPtr load(const std::string &plugin, const std::vector<rclcpp::Parameter> &parameters) {
+  LoadNode::Response::SharedPtr load(const std::string &plugin, const std::vector<rclcpp::Parameter> &parameters,
+                                     const std::string &space = "redag_rclcpp::examples::") {
     LoadNode::Request request;
     request.package_name = "examples";
-    request.plugin_name = "redag_rclcpp::examples::" + plugin;
+    request.plugin_name = space + plugin;
     request.node_namespace = "/fast";
     for (const auto &parameter : parameters) request.parameters.push_back(parameter.to_parameter_msg());
     return call<LoadNode>("/ComponentManager/_container/load_node", request);
@@ -221,6 +225,28 @@ TEST_F(ContainerTest, ACallbackWaitsForItsOwnGroupsClientsWithOneWorker) {
     ASSERT_TRUE(loaded->success) << loaded->error_message;
   }
   EXPECT_TRUE(eventually([&] { return text().find("plans with the map, cells of 0.05 m") != std::string::npos; }));
+  container.interrupt();
+  EXPECT_EQ(container.wait(), 0);
+}
+
+// In mode `os` the worker that loads a component is a real-time thread.
+TEST_F(ContainerTest, ThreadsOfANodesConstructorAreLikeThoseOfMain) {
+  Process container = start({"--ros-args", "-p", "workers:=2", "-p", "preemption:=auto"});
+  const std::string report = (folder_ / "thread").string();
+  const auto loaded = load("Threaded", {rclcpp::Parameter("report", report)}, "redag_rclcpp::");
+  ASSERT_NE(loaded, nullptr);
+  ASSERT_TRUE(loaded->success) << loaded->error_message;
+  std::ifstream in(report);
+  int policy = -1;
+  int priority = -1;
+  std::string name;
+  in >> policy >> priority >> name;
+  sched_param own{};
+  int own_policy = -1;
+  pthread_getschedparam(pthread_self(), &own_policy, &own);  // what the container has inherited
+  EXPECT_EQ(policy, own_policy);
+  EXPECT_EQ(priority, own.sched_priority);
+  EXPECT_EQ(name, "component_conta");
   container.interrupt();
   EXPECT_EQ(container.wait(), 0);
 }

@@ -75,6 +75,7 @@ TEST_P(BagFormats, AreReadTwiceAndByTopic) {
   constexpr std::uint64_t kInstants = 400;  // 1.8 s: two files where the bag is split
   RandomRecording recording(kInstants);
   const WrittenBag bag(recording, GetParam());
+  EXPECT_EQ(bag.files(), GetParam().split_after > 0 ? 3U : 2U);
   const auto whole = open_bag(bag.path(), {});
   ASSERT_TRUE(whole) << to_string(whole.error());
   ASSERT_EQ((*whole)->topics().size(), 3U);  // without /clock

@@ -91,6 +91,12 @@ class WrittenBag {
 
   [[nodiscard]] std::filesystem::path folder() const { return parent_ / "bag"; }
   [[nodiscard]] std::string path() const { return folder().string(); }
+  /// How many files the bag has, with metadata.yaml.
+  [[nodiscard]] std::size_t files() const {
+    std::size_t number = 0;
+    for (const auto &entry : std::filesystem::directory_iterator(folder())) number += entry.is_regular_file() ? 1 : 0;
+    return number;
+  }
   /// The path of the first file with this ending.
   [[nodiscard]] std::filesystem::path file(const std::string &ending) const {
     std::filesystem::path found;

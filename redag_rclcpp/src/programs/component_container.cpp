@@ -4,11 +4,14 @@
 // component_container is rclcpp_components' container with a ReDAGExecutor. Components need no change. The executor
 // orders their callbacks, and the monitor reports on them (docs/ros2.md).
 #include <fmt/format.h>
+#include <pthread.h>
+#include <sched.h>
 
 #include <algorithm>
 #include <array>
 #include <cstdint>
 #include <cstdio>
+#include <future>
 #include <memory>
 #include <string>
 #include <vector>
@@ -91,17 +94,57 @@ The container ends on SIGINT or SIGTERM. Exit status: 0 success; 1 a callback
 threw an exception or results could not be written; 2 invalid parameters.
 )";
 
-/// Keeps an unloaded component alive until its callbacks have ended: another worker may still execute one of them.
+/// What a new thread takes over from the thread that starts it.
+class ThreadTraits {
+ public:
+  /// Those of the calling thread.
+  ThreadTraits() {
+    pthread_getschedparam(pthread_self(), &policy_, &parameters_);
+    pthread_getaffinity_np(pthread_self(), sizeof(processors_), &processors_);
+    pthread_getname_np(pthread_self(), name_.data(), name_.size());
+  }
+
+  /// Gives them to the calling thread. False: the system refused one of them.
+  [[nodiscard]] bool apply() const {
+    const bool is_set = pthread_setschedparam(pthread_self(), policy_, &parameters_) == 0 &&
+                        pthread_setaffinity_np(pthread_self(), sizeof(processors_), &processors_) == 0;
+    return pthread_setname_np(pthread_self(), name_.data()) == 0 && is_set;
+  }
+
+ private:
+  int policy_ = SCHED_OTHER;
+  sched_param parameters_{};
+  cpu_set_t processors_{};
+  std::array<char, 16> name_{};
+};
+
+/// - Loads components on a thread like main()'s. Threads that a node starts in its constructor are then as in rclcpp's
+///   container. From a worker they would take its real-time priority, for instance a recorder's writer of files.
+/// - Keeps an unloaded component alive until its callbacks have ended: another worker may still execute one of them.
 class Manager : public rclcpp_components::ComponentManager {
  public:
   using ComponentManager::ComponentManager;
 
  protected:
+  void on_load_node(const std::shared_ptr<rmw_request_id_t> header, const std::shared_ptr<LoadNode::Request> request,
+                    std::shared_ptr<LoadNode::Response> response) override {
+    std::async(std::launch::async, [&] {
+      if (!of_main_.apply()) {
+        RCLCPP_WARN(get_logger(), "%s is loaded with a worker's priority or processors, because Linux refused main()'s",
+                    request->plugin_name.c_str());
+      }
+      ComponentManager::on_load_node(header, request, response);
+    }).get();
+  }
+
   void remove_node_from_executor(std::uint64_t id) override {
     const auto executor = std::dynamic_pointer_cast<redag_rclcpp::ReDAGExecutor>(executor_.lock());
     rclcpp_components::NodeInstanceWrapper &component = node_wrappers_.at(id);
     if (executor) executor->retire_node(component.get_node_base_interface(), component.get_node_instance());
   }
+
+ private:
+  const ThreadTraits of_main_;
 };
 
 /// The arguments of rclcpp's component_container.
