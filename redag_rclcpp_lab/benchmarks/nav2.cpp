@@ -75,69 +75,103 @@ nlohmann::json obstacles(const char *plugin) {
             {"marking", true}}}};
 }
 
-/// Parameters of all nodes, as a file. They are those of nav2_bringup where there is no reason for others.
-void write_parameters(const std::string &file, const Rates &rates) {
+// The parameters are those of nav2_bringup where there is no reason for others.
+
+nlohmann::json controller_parameters(const Rates &rates) {
+  return {{"controller_frequency", rates.controller},
+          {"enable_stamped_cmd_vel", true},
+          {"failure_tolerance", 0.3},
+          {"progress_checker_plugins", {"progress_checker"}},
+          {"goal_checker_plugins", {"goal_checker"}},
+          {"controller_plugins", {"FollowPath"}},
+          {"progress_checker",
+           {{"plugin", "nav2_controller::SimpleProgressChecker"},
+            {"required_movement_radius", 0.5},
+            {"movement_time_allowance", 10.0}}},
+          {"goal_checker",
+           {{"plugin", "nav2_controller::SimpleGoalChecker"}, {"xy_goal_tolerance", 0.4}, {"yaw_goal_tolerance", 6.3}}},
+          {"FollowPath",
+           {{"plugin", "nav2_regulated_pure_pursuit_controller::RegulatedPurePursuitController"},
+            {"desired_linear_vel", 1.5},
+            {"lookahead_dist", 0.9},
+            {"use_cost_regulated_linear_velocity_scaling", false}}}};
+}
+
+nlohmann::json planner_parameters() {
+  return {{"expected_planner_frequency", 0.0},
+          {"planner_plugins", {"GridBased"}},
+          {"GridBased", {{"plugin", "nav2_navfn_planner::NavfnPlanner"}, {"tolerance", 0.5}}}};
+}
+
+nlohmann::json manager_parameters() {
+  return {{"autostart", true}, {"node_names", {"controller_server", "planner_server"}}};
+}
+
+nlohmann::json local_costmap_parameters() {
+  nlohmann::json voxels = obstacles("nav2_costmap_2d::VoxelLayer");
+  voxels.update({{"publish_voxel_map", false}, {"origin_z", 0.0}, {"z_resolution", 0.05}, {"z_voxels", 16}});
+  return {{"update_frequency", kUpdates},
+          {"publish_frequency", 2 * kUpdates},  // each update is published
+          {"global_frame", "odom"},
+          {"rolling_window", true},
+          {"width", 4},
+          {"height", 4},
+          {"resolution", 0.05},
+          {"robot_radius", 0.22},
+          {"always_send_full_costmap", true},
+          {"plugins", {"voxel_layer", "inflation_layer"}},
+          {"voxel_layer", voxels},
+          {"inflation_layer", inflation()}};
+}
+
+nlohmann::json global_costmap_parameters() {
+  return {{"update_frequency", 1.0},
+          {"publish_frequency", 1.0},
+          {"global_frame", "map"},
+          {"robot_radius", 0.22},
+          {"resolution", 0.05},
+          {"track_unknown_space", true},
+          {"plugins", {"static_layer", "obstacle_layer", "inflation_layer"}},
+          {"static_layer", {{"plugin", "nav2_costmap_2d::StaticLayer"}, {"map_subscribe_transient_local", true}}},
+          {"obstacle_layer", obstacles("nav2_costmap_2d::ObstacleLayer")},
+          {"inflation_layer", inflation()}};
+}
+
+/// The servers make the nodes of their costmaps themselves. These nodes take parameters from the process alone.
+void write_costmap_parameters(const std::string &file) {
   nlohmann::json nodes;
-  nodes["controller_server"]["ros__parameters"] = {
-      {"controller_frequency", rates.controller},
-      {"enable_stamped_cmd_vel", true},
-      {"failure_tolerance", 0.3},
-      {"progress_checker_plugins", {"progress_checker"}},
-      {"goal_checker_plugins", {"goal_checker"}},
-      {"controller_plugins", {"FollowPath"}},
-      {"progress_checker",
-       {{"plugin", "nav2_controller::SimpleProgressChecker"},
-        {"required_movement_radius", 0.5},
-        {"movement_time_allowance", 10.0}}},
-      {"goal_checker",
-       {{"plugin", "nav2_controller::SimpleGoalChecker"}, {"xy_goal_tolerance", 0.4}, {"yaw_goal_tolerance", 6.3}}},
-      {"FollowPath",
-       {{"plugin", "nav2_regulated_pure_pursuit_controller::RegulatedPurePursuitController"},
-        {"desired_linear_vel", 1.5},
-        {"lookahead_dist", 0.9},
-        {"use_cost_regulated_linear_velocity_scaling", false}}}};
-  nodes["planner_server"]["ros__parameters"] = {
-      {"expected_planner_frequency", 0.0},
-      {"planner_plugins", {"GridBased"}},
-      {"GridBased", {{"plugin", "nav2_navfn_planner::NavfnPlanner"}, {"tolerance", 0.5}}}};
-  nodes["local_costmap"]["local_costmap"]["ros__parameters"] = {
-      {"update_frequency", kUpdates},
-      {"publish_frequency", 2 * kUpdates},  // each update is published
-      {"global_frame", "odom"},
-      {"rolling_window", true},
-      {"width", 4},
-      {"height", 4},
-      {"resolution", 0.05},
-      {"robot_radius", 0.22},
-      {"always_send_full_costmap", true},
-      {"plugins", {"voxel_layer", "inflation_layer"}},
-      {"voxel_layer", obstacles("nav2_costmap_2d::VoxelLayer")},
-      {"inflation_layer", inflation()}};
-  nodes["local_costmap"]["local_costmap"]["ros__parameters"]["voxel_layer"].update(
-      {{"publish_voxel_map", false}, {"origin_z", 0.0}, {"z_resolution", 0.05}, {"z_voxels", 16}});
-  nodes["global_costmap"]["global_costmap"]["ros__parameters"] = {
-      {"update_frequency", 1.0},
-      {"publish_frequency", 1.0},
-      {"global_frame", "map"},
-      {"robot_radius", 0.22},
-      {"resolution", 0.05},
-      {"track_unknown_space", true},
-      {"plugins", {"static_layer", "obstacle_layer", "inflation_layer"}},
-      {"static_layer", {{"plugin", "nav2_costmap_2d::StaticLayer"}, {"map_subscribe_transient_local", true}}},
-      {"obstacle_layer", obstacles("nav2_costmap_2d::ObstacleLayer")},
-      {"inflation_layer", inflation()}};
-  nodes["lifecycle_manager"]["ros__parameters"] = {{"autostart", true},
-                                                   {"node_names", {"controller_server", "planner_server"}}};
+  nodes["local_costmap"]["local_costmap"]["ros__parameters"] = local_costmap_parameters();
+  nodes["global_costmap"]["global_costmap"]["ros__parameters"] = global_costmap_parameters();
   std::ofstream(file) << nodes << "\n";  // YAML contains JSON
+}
+
+/// A component takes its parameters from the request that loads it: those of inner objects as NAME.INNER.
+std::vector<rclcpp::Parameter> flat(const nlohmann::json &parameters, const std::string &prefix = "") {
+  std::vector<rclcpp::Parameter> all;
+  for (const auto &[key, value] : parameters.items()) {
+    const std::string name = prefix + key;
+    if (value.is_object()) {
+      for (const rclcpp::Parameter &inner : flat(value, name + ".")) all.push_back(inner);
+    } else if (value.is_array()) {
+      all.emplace_back(name, value.get<std::vector<std::string>>());
+    } else if (value.is_boolean()) {
+      all.emplace_back(name, value.get<bool>());
+    } else if (value.is_string()) {
+      all.emplace_back(name, value.get<std::string>());
+    } else {
+      all.emplace_back(name, value.get<double>());
+    }
+  }
+  return all;
 }
 
 std::vector<Component> robot(const Rates &rates, const std::string &folder) {
   const std::string own = "redag_rclcpp_lab";
   return {{own, "redag_rclcpp::lab::Base", {}, {rclcpp::Parameter("report", folder + "/base")}},
           {own, "redag_rclcpp::lab::Lidar", {}, {rclcpp::Parameter("period", 1 / rates.scans)}},
-          {"nav2_controller", "nav2_controller::ControllerServer"},
-          {"nav2_planner", "nav2_planner::PlannerServer"},
-          {"nav2_lifecycle_manager", "nav2_lifecycle_manager::LifecycleManager"}};
+          {"nav2_controller", "nav2_controller::ControllerServer", {}, flat(controller_parameters(rates))},
+          {"nav2_planner", "nav2_planner::PlannerServer", {}, flat(planner_parameters())},
+          {"nav2_lifecycle_manager", "nav2_lifecycle_manager::LifecycleManager", {}, flat(manager_parameters())}};
 }
 
 Component control(const Rates &rates, const StackOptions &options, const std::string &folder) {
@@ -185,7 +219,7 @@ void report_commands(Figures &figures, const nlohmann::json &base, Time begin, T
 
 Figures measure(const StackRun &run, const StackOptions &options, const Rates &rates) {
   const std::string parameters = run.folder + "/parameters.yaml";
-  write_parameters(parameters, rates);
+  write_costmap_parameters(parameters);
   Figures figures;
   Container container(run, options, parameters);
   const Time start = monotonic_now();

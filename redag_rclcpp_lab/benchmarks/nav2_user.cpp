@@ -9,6 +9,7 @@
 #include <cmath>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
 #include "nav2_world.hpp"
 #include "redag/runtime/clock.hpp"
@@ -76,12 +77,15 @@ Path NavigationUser::plan(std::size_t place) {
   const Time sent = monotonic_now();
   auto accepted = planner_->async_send_goal(goal);
   await(accepted, "/compute_path_to_pose");
-  if (!accepted.get()) throw std::runtime_error("/compute_path_to_pose refused a goal");
+  if (!accepted.get()) {
+    count(refused_);
+    return {};
+  }
   auto result = planner_->async_get_result(accepted.get());
   await(result, "/compute_path_to_pose");
   const bool planned = result.get().code == rclcpp_action::ResultCode::SUCCEEDED;
   if (sent >= begin_ && planned) plans_.add(monotonic_now() - sent);
-  if (sent >= begin_ && !planned) ++unplanned_;
+  if (!planned) count(unplanned_);
   return planned ? result.get().result->path : Path();
 }
 
@@ -90,7 +94,10 @@ NavigationUser::FollowResult NavigationUser::follow(const Path &path) {
   goal.path = path;
   auto accepted = controller_->async_send_goal(goal);
   await(accepted, "/follow_path");
-  if (!accepted.get()) throw std::runtime_error("/follow_path refused a goal");
+  if (!accepted.get()) {
+    count(refused_);
+    return {};
+  }
   return controller_->async_get_result(accepted.get());
 }
 
@@ -100,26 +107,35 @@ void NavigationUser::drive(Time begin, Time end) {
     throw std::runtime_error("Nav2 offers no actions");
   }
   for (std::size_t place = 0; monotonic_now() < end; place = (place + 1) % hall::kPlaces.size()) {
-    FollowResult result;
+    FollowResult result;  // not valid before the first plan is followed
     do {
-      if (const Path path = plan(place); !path.poses.empty()) result = follow(path);
-      if (!result.valid()) {  // no plan to begin with
-        executor_.spin_some();
-        std::this_thread::sleep_for(kReplan);
-        continue;
+      if (const Path path = plan(place); !path.poses.empty()) {
+        if (FollowResult next = follow(path); next.valid()) result = std::move(next);
       }
-    } while (monotonic_now() < end && (!result.valid() || executor_.spin_until_future_complete(result, kReplan) !=
-                                                              rclcpp::FutureReturnCode::SUCCESS));
-    const bool over = result.valid() && result.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
-    if (!over || monotonic_now() < begin_) continue;
-    ++(result.get().code == rclcpp_action::ResultCode::SUCCEEDED ? reached_ : failed_);
+    } while (!is_over(result) && monotonic_now() < end);
+    if (!result.valid() || result.wait_for(std::chrono::seconds(0)) != std::future_status::ready) continue;
+    count(result.get().code == rclcpp_action::ResultCode::SUCCEEDED ? reached_ : failed_);
   }
+}
+
+bool NavigationUser::is_over(const FollowResult &result) {
+  if (result.valid()) {
+    return executor_.spin_until_future_complete(result, kReplan) == rclcpp::FutureReturnCode::SUCCESS;
+  }
+  executor_.spin_some();
+  std::this_thread::sleep_for(kReplan);
+  return false;
+}
+
+void NavigationUser::count(int &events) const {
+  if (monotonic_now() >= begin_) ++events;
 }
 
 void NavigationUser::report(Figures &figures, double update_rate) const {
   figures["places reached"] = reached_;
   figures["places not reached"] = failed_;
   figures["plans failed"] = unplanned_;
+  figures["goals refused"] = refused_;
   if (plans_.size() > 0) {
     figures["plan done after, ms, p50"] = plans_.milliseconds(0.5);
     figures["plan done after, ms, p99"] = plans_.milliseconds(0.99);

@@ -45,8 +45,12 @@ class NavigationUser {
 
   /// Empty without a plan.
   nav_msgs::msg::Path plan(std::size_t place);
-  /// Sends the path, which takes the place of an earlier one.
+  /// Sends the path, which takes the place of an earlier one. Not valid if Nav2 refuses it.
   FollowResult follow(const nav_msgs::msg::Path &path);
+  /// Waits for the result until it is time to plan anew.
+  bool is_over(const FollowResult &result);
+  /// Adds one, if measuring has begun.
+  void count(int &events) const;
   template <class Future>
   void await(const Future &future, const char *what);
 
@@ -61,6 +65,7 @@ class NavigationUser {
   int unplanned_ = 0;
   int reached_ = 0;
   int failed_ = 0;
+  int refused_ = 0;  // Nav2's servers are not active: its lifecycle manager heard nothing of them for some seconds
   std::vector<std::int64_t> costmap_stamps_;
 };
 
