@@ -18,7 +18,6 @@ namespace redag_rclcpp::lab {
 
 using nav_msgs::msg::OccupancyGrid;
 using nav_msgs::msg::Path;
-using redag::Duration;
 using redag::Time;
 using redag::runtime::monotonic_now;
 using std_srvs::srv::Trigger;
@@ -135,18 +134,14 @@ void NavigationUser::report(Figures &figures, double update_rate) const {
   figures["places not reached"] = failed_;
   figures["plans failed"] = unplanned_;
   figures["goals unserved"] = unserved_;
-  if (plans_.size() > 0) {
-    figures["plan done after, ms, p50"] = plans_.milliseconds(0.5);
-    figures["plan done after, ms, p99"] = plans_.milliseconds(0.99);
-  }
+  add_samples(figures, "plan done after", plans_);
   Samples off;
   const auto period = static_cast<double>(redag::kSecond) / update_rate;
   for (std::size_t i = 1; i < costmap_stamps_.size(); ++i) {
     off.add(std::llround(std::abs(static_cast<double>(costmap_stamps_[i] - costmap_stamps_[i - 1]) - period)));
   }
   if (off.size() == 0) throw std::runtime_error("the local costmap was not published");
-  figures["costmap interval off, ms, p50"] = off.milliseconds(0.5);
-  figures["costmap interval off, ms, p99"] = off.milliseconds(0.99);
+  add_samples(figures, "costmap interval off", off);
 }
 
 }  // namespace redag_rclcpp::lab

@@ -40,7 +40,6 @@ class NavigationUser {
  private:
   using Plan = nav2_msgs::action::ComputePathToPose;
   using Follow = nav2_msgs::action::FollowPath;
-  using FollowHandle = rclcpp_action::ClientGoalHandle<Follow>::SharedPtr;
   using FollowResult = std::shared_future<rclcpp_action::ClientGoalHandle<Follow>::WrappedResult>;
 
   /// Empty if there is no plan.
