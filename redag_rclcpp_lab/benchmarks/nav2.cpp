@@ -29,7 +29,6 @@
 
 namespace {
 
-using redag::Duration;
 using redag::Time;
 using redag::runtime::monotonic_now;
 using redag_rclcpp::lab::Component;
@@ -182,12 +181,6 @@ Component control(const Rates &rates, const StackOptions &options, const std::st
            rclcpp::Parameter("seconds", options.seconds), rclcpp::Parameter("report", folder + "/control")}};
 }
 
-void report(Figures &figures, const std::string &name, const Samples &samples) {
-  if (samples.size() == 0) return;
-  figures[name + ", ms, p50"] = samples.milliseconds(0.5);
-  figures[name + ", ms, p99"] = samples.milliseconds(0.99);
-}
-
 /// What the base noted from `begin` to `end`, on the system's clock.
 void report_commands(Figures &figures, const nlohmann::json &base, Time begin, Time end, double rate) {
   const double period = static_cast<double>(redag::kSecond) / rate;
@@ -208,13 +201,13 @@ void report_commands(Figures &figures, const nlohmann::json &base, Time begin, T
   }
   if (off.size() == 0) throw std::runtime_error("the base got no commands");
   figures["commands missed, %"] = 100 * missed / (missed + static_cast<double>(off.size()));
-  report(figures, "command interval off", off);
-  report(figures, "command to base", transit);
+  add_samples(figures, "command interval off", off);
+  add_samples(figures, "command to base", transit);
   Samples ages;
   for (const std::pair<Time, Time> pose : base.at("poses")) {
     if (begin <= pose.second && pose.second < end) ages.add(pose.second - pose.first);
   }
-  report(figures, "pose to command", ages);
+  add_samples(figures, "pose to command", ages);
 }
 
 Figures measure(const StackRun &run, const StackOptions &options, const Rates &rates) {

@@ -18,14 +18,13 @@ namespace redag_rclcpp::lab {
 
 using nav_msgs::msg::OccupancyGrid;
 using nav_msgs::msg::Path;
-using redag::Duration;
 using redag::Time;
 using redag::runtime::monotonic_now;
 using std_srvs::srv::Trigger;
 
 namespace {
 
-constexpr std::chrono::seconds kLimit(30);  // of an answer
+constexpr std::chrono::seconds kLimit(5);  // of an answer
 constexpr std::chrono::seconds kStartLimit(90);
 constexpr std::chrono::milliseconds kReplan(500);
 
@@ -45,10 +44,8 @@ NavigationUser::NavigationUser()
 }
 
 template <class Future>
-void NavigationUser::await(const Future &future, const char *what) {
-  if (executor_.spin_until_future_complete(future, kLimit) != rclcpp::FutureReturnCode::SUCCESS) {
-    throw std::runtime_error(fmt::format("no answer from {}", what));
-  }
+bool NavigationUser::await(const Future &future) {
+  return executor_.spin_until_future_complete(future, kLimit) == rclcpp::FutureReturnCode::SUCCESS;
 }
 
 void NavigationUser::await_active() {
@@ -76,13 +73,15 @@ Path NavigationUser::plan(std::size_t place) {
   goal.goal.pose.orientation.w = 1;
   const Time sent = monotonic_now();
   auto accepted = planner_->async_send_goal(goal);
-  await(accepted, "/compute_path_to_pose");
-  if (!accepted.get()) {
-    count(refused_);
-    return {};
+  if (!await(accepted) || !accepted.get()) {
+    count(unserved_);
+    return Path();
   }
   auto result = planner_->async_get_result(accepted.get());
-  await(result, "/compute_path_to_pose");
+  if (!await(result)) {
+    count(unserved_);
+    return Path();
+  }
   const bool planned = result.get().code == rclcpp_action::ResultCode::SUCCEEDED;
   if (sent >= begin_ && planned) plans_.add(monotonic_now() - sent);
   if (!planned) count(unplanned_);
@@ -93,9 +92,8 @@ NavigationUser::FollowResult NavigationUser::follow(const Path &path) {
   Follow::Goal goal;
   goal.path = path;
   auto accepted = controller_->async_send_goal(goal);
-  await(accepted, "/follow_path");
-  if (!accepted.get()) {
-    count(refused_);
+  if (!await(accepted) || !accepted.get()) {
+    count(unserved_);
     return {};
   }
   return controller_->async_get_result(accepted.get());
@@ -135,19 +133,15 @@ void NavigationUser::report(Figures &figures, double update_rate) const {
   figures["places reached"] = reached_;
   figures["places not reached"] = failed_;
   figures["plans failed"] = unplanned_;
-  figures["goals refused"] = refused_;
-  if (plans_.size() > 0) {
-    figures["plan done after, ms, p50"] = plans_.milliseconds(0.5);
-    figures["plan done after, ms, p99"] = plans_.milliseconds(0.99);
-  }
+  figures["goals unserved"] = unserved_;
+  add_samples(figures, "plan done after", plans_);
   Samples off;
   const auto period = static_cast<double>(redag::kSecond) / update_rate;
   for (std::size_t i = 1; i < costmap_stamps_.size(); ++i) {
     off.add(std::llround(std::abs(static_cast<double>(costmap_stamps_[i] - costmap_stamps_[i - 1]) - period)));
   }
   if (off.size() == 0) throw std::runtime_error("the local costmap was not published");
-  figures["costmap interval off, ms, p50"] = off.milliseconds(0.5);
-  figures["costmap interval off, ms, p99"] = off.milliseconds(0.99);
+  add_samples(figures, "costmap interval off", off);
 }
 
 }  // namespace redag_rclcpp::lab

@@ -40,10 +40,9 @@ class NavigationUser {
  private:
   using Plan = nav2_msgs::action::ComputePathToPose;
   using Follow = nav2_msgs::action::FollowPath;
-  using FollowHandle = rclcpp_action::ClientGoalHandle<Follow>::SharedPtr;
   using FollowResult = std::shared_future<rclcpp_action::ClientGoalHandle<Follow>::WrappedResult>;
 
-  /// Empty without a plan.
+  /// Empty if there is no plan.
   nav_msgs::msg::Path plan(std::size_t place);
   /// Sends the path, which takes the place of an earlier one. Not valid if Nav2 refuses it.
   FollowResult follow(const nav_msgs::msg::Path &path);
@@ -51,8 +50,9 @@ class NavigationUser {
   bool is_over(const FollowResult &result);
   /// Adds one, if measuring has begun.
   void count(int &events) const;
+  /// False if the answer does not come.
   template <class Future>
-  void await(const Future &future, const char *what);
+  bool await(const Future &future);
 
   rclcpp::Node::SharedPtr node_;
   rclcpp::executors::SingleThreadedExecutor executor_;
@@ -65,7 +65,7 @@ class NavigationUser {
   int unplanned_ = 0;
   int reached_ = 0;
   int failed_ = 0;
-  int refused_ = 0;  // Nav2's servers are not active: its lifecycle manager heard nothing of them for some seconds
+  int unserved_ = 0;  // refused, or without an answer: Nav2's lifecycle manager has shut the servers down
   std::vector<std::int64_t> costmap_stamps_;
 };
 

@@ -152,12 +152,6 @@ nlohmann::json read_report(const std::string &file) {
   return nlohmann::json::parse(in);
 }
 
-void report(Figures &figures, const std::string &name, const Samples &samples) {
-  if (samples.size() == 0) return;
-  figures[name + ", ms, p50"] = samples.milliseconds(0.5);
-  figures[name + ", ms, p99"] = samples.milliseconds(0.99);
-}
-
 /// What the hardware saw: intervals between its reads, reads that did not come, and the age of new commands.
 void report_plant(Figures &figures, const nlohmann::json &plant, const Window &window, double rate) {
   const auto period = static_cast<redag::Duration>(redag::kSecond / rate);
@@ -176,12 +170,12 @@ void report_plant(Figures &figures, const nlohmann::json &plant, const Window &w
   if (off.size() == 0) throw std::runtime_error("the hardware was not read");
   const double expected = std::round(static_cast<double>(last - *first) / static_cast<double>(period));
   figures["updates missed, %"] = 100 * (expected - static_cast<double>(off.size())) / expected;
-  report(figures, "update interval off", off);
+  add_samples(figures, "update interval off", off);
   Samples ages;
   for (const std::pair<redag::Time, redag::Duration> command : plant.at("commands")) {
     if (window.has(command.first)) ages.add(command.second);
   }
-  report(figures, "command to hardware", ages);
+  add_samples(figures, "command to hardware", ages);
 }
 
 void report_planner(Figures &figures, const nlohmann::json &planner, const Window &window) {
@@ -190,7 +184,7 @@ void report_planner(Figures &figures, const nlohmann::json &planner, const Windo
     if (window.has(plan.first)) done.add(plan.second - plan.first);
   }
   figures["plans missed, %"] = 100 * (1 - static_cast<double>(done.size()) / (kPlansPerSecond * window.seconds()));
-  report(figures, "plan done after", done);
+  add_samples(figures, "plan done after", done);
 }
 
 /// One run of a contender. Throws if it does not go to its end.

@@ -28,12 +28,6 @@ constexpr std::chrono::seconds kLimit(30);  // of an answer
 constexpr redag::Duration kCallPeriod = 200 * redag::kMillisecond;
 const std::vector<std::string> kControllers = {"joint_state_broadcaster", "arm_controller", "gripper_controller"};
 
-void add(Figures &figures, const std::string &name, const Samples &latencies) {
-  if (latencies.size() == 0) return;
-  figures[name + " answers, ms, p50"] = latencies.milliseconds(0.5);
-  figures[name + " answers, ms, p99"] = latencies.milliseconds(0.99);
-}
-
 }  // namespace
 
 template <class Service>
@@ -99,9 +93,9 @@ void Operator::run(redag::Time end) {
 }
 
 void Operator::report(Figures &figures) const {
-  add(figures, "list", list_.latencies());
-  add(figures, "load", load_.latencies());
-  add(figures, "switch", switch_.latencies());
+  add_samples(figures, "list answers", list_.latencies());
+  add_samples(figures, "load answers", load_.latencies());
+  add_samples(figures, "switch answers", switch_.latencies());
   figures["switches failed"] = failed_;
 }
 

@@ -12,7 +12,6 @@
 #include <stdexcept>
 
 #include "command_line.hpp"
-#include "samples.hpp"
 
 namespace redag_rclcpp::lab {
 namespace {
@@ -71,6 +70,12 @@ int compare(const StackComparison &comparison, const StackOptions &options, cons
 }
 
 }  // namespace
+
+void add_samples(Figures &figures, const std::string &name, const Samples &samples) {
+  if (samples.size() == 0) return;
+  figures[name + ", ms, p50"] = samples.milliseconds(0.5);
+  figures[name + ", ms, p99"] = samples.milliseconds(0.99);
+}
 
 int run_comparison(const StackComparison &comparison, int argc, char **argv) {
   StackOptions options;

@@ -12,6 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "samples.hpp"
+
 namespace redag_rclcpp::lab {
 
 /// Options that every comparison has.
@@ -23,6 +25,9 @@ struct StackOptions {
 
 /// What was measured, by name.
 using Figures = std::map<std::string, double>;
+
+/// Adds the median and the p99 in milliseconds; nothing without samples.
+void add_samples(Figures &figures, const std::string &name, const Samples &samples);
 
 /// One run, which may use `folder` for its files.
 struct StackRun {

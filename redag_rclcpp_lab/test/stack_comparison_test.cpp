@@ -133,6 +133,16 @@ TEST_F(StackComparisonTest, HelpIsPrinted) {
   EXPECT_THAT(runs_, IsEmpty());
 }
 
+TEST(AddSamples, MedianAndP99) {
+  Figures figures;
+  Samples samples;
+  add_samples(figures, "late", samples);
+  EXPECT_THAT(figures, IsEmpty());
+  for (int i = 0; i <= 100; ++i) samples.add(i * redag::kMillisecond);
+  add_samples(figures, "late", samples);
+  EXPECT_EQ(figures, (Figures{{"late, ms, p50", 50}, {"late, ms, p99", 99}}));
+}
+
 class ChildProcessTest : public ::testing::Test {
  protected:
   /// Runs a shell's script to the end that end() asks for.
