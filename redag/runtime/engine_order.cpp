@@ -93,12 +93,11 @@ Result<void> Engine::look_at_order() {
   OrderLook look = look_at({order_page_->name(), statement_}, live::read_order_pages(options_.order_folder));
   {
     const LockGuard guard(lock_);
-    const bool differs = look.order != order_;
-    if (differs) {
+    if (look.order != order_) {
       order_ = std::move(look.order);
       map_levels();
+      placement_.follow_levels();
     }
-    if (differs) placement_.follow_levels();
     // The engine's most urgent rate may have gone, and the order be the same.
     if (placement_.of_releases() < placement_.of_leader()) move_releases();
   }
