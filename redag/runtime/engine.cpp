@@ -83,6 +83,7 @@ Result<void> Engine::start() {
   Locked locked(*this);
   withdraw_if_halting(locked);
   if (cpus.empty()) cpus = usable;
+  move_releases();
   placement_.start(std::min(cpus.size(), usable.size()));
   if (guard_) guard_->start(cpus);
   running_ = true;

@@ -151,6 +151,7 @@ class Engine {
 
   /// Lets an idle thread wait in the place of the release thread (its leader). Call it before start(). `thread` must
   /// live until join() has returned. With realtime_threads it has no effect: an idle thread is not above busy ones.
+  /// With `os` the engine gives the thread its priority from start() on.
   void share_releases(ReleaseThread &thread) { releases_ = options_.realtime_threads ? nullptr : &thread; }
 
   /// Sets the origin (CLOCK_MONOTONIC) of all times that the scheduler sees. Until then now() is 0. Call it before any
@@ -269,6 +270,7 @@ class Engine {
   void follow_order() noexcept;
   Result<void> look_at_order();
   void map_levels() REDAG_REQUIRES(lock_);
+  void move_releases() REDAG_REQUIRES(lock_);
   void tasks_changed() REDAG_REQUIRES(lock_) {
     rates_changed_ = true;
     map_levels();

@@ -39,6 +39,16 @@ void Engine::map_levels() {
     priorities.push_back(is_used ? order_.priority_of(rate) : priorities.back());
   }
   placement_.set_levels(std::move(priorities));
+  if (placement_.of_releases() > placement_.of_leader()) move_releases();
+}
+
+// Gives the release thread, and the leader in its place, the priority that follows from the levels. If it rises, that
+// comes before the jobs' new priorities, and otherwise after them.
+void Engine::move_releases() {
+  if (!os() || releases_ == nullptr) return;
+  const int priority = placement_.of_releases();
+  if (!releases_->set_priority(priority)) placement_.count_refused();
+  placement_.set_leader(priority);
 }
 
 // Replaces what the engine states of its rates, if tasks have changed since the last call.
@@ -88,6 +98,8 @@ Result<void> Engine::look_at_order() {
       map_levels();
       placement_.follow_levels();
     }
+    // The engine's most urgent rate may have gone, and the order be the same.
+    if (placement_.of_releases() < placement_.of_leader()) move_releases();
   }
   return look.must_publish ? order_page_->publish(statement_) : Result<void>();
 }

@@ -52,7 +52,10 @@ class SharingEngine {
     options.order_folder = folder;
     engine = std::make_unique<Engine>(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
     engine->bind(workload, std::move(bodies));
+    engine->share_releases(releases_);
+    EXPECT_TRUE(releases_.start({.name = "releases", .fifo_priority = band_.timer, .cpus = {}}));
     EXPECT_TRUE(engine->start());
+    release_thread_known_.wait();
     engine->set_origin(monotonic_now());
     // The most urgent one comes last: the others are in progress, too, because each has a thread.
     for (std::size_t i = periods.size(); i-- > 0;) {
@@ -80,6 +83,14 @@ class SharingEngine {
     }
     EXPECT_EQ(priorities(), wanted);
   }
+  /// Priority of the thread that releases jobs.
+  [[nodiscard]] int of_releases() const { return fifo_priority(release_thread_); }
+  void expect_of_releases(int wanted) const {
+    for (const Time end = monotonic_now() + kPatience; of_releases() != wanted && monotonic_now() < end;) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    EXPECT_EQ(of_releases(), wanted);
+  }
 
   std::unique_ptr<Engine> engine;
 
@@ -89,6 +100,13 @@ class SharingEngine {
     pthread_t thread{};
   };
   PriorityBand band_;
+  pthread_t release_thread_{};
+  Event release_thread_known_;
+  ReleaseThread releases_{[this] {
+    if (!release_thread_known_.is_set()) release_thread_ = pthread_self();
+    release_thread_known_.set();
+    return kNever;
+  }};
   std::vector<Held> held_;
   Event may_end_;
 };
@@ -177,6 +195,68 @@ TEST_F(EngineOrder, StatesThePrioritiesOfTasks) {
   a->expect({top_, top_ - 2});
   EXPECT_EQ(a->engine->figures(TaskId(0)).priority, top_);
   EXPECT_EQ(a->engine->figures(TaskId(1)).priority, top_ - 2);
+}
+
+// The releases of b do not delay the jobs of a, which are more urgent than all jobs of b.
+TEST_F(EngineOrder, ReleasesAreJustAboveTheOwnJobs) {
+  const auto a = member({10, 30});
+  auto b = member({20, 40});
+  EXPECT_EQ(b->of_releases(), top_) << "before its first job";
+  a->expect({top_, top_ - 2});
+  EXPECT_EQ(a->of_releases(), band_.timer);
+  // The most urgent task of b becomes the most urgent of all. Its release thread is above it from then on.
+  b->engine->set_timing(TaskId(0), 5 * kMillisecond, 5 * kMillisecond);
+  EXPECT_EQ(b->of_releases(), band_.timer);
+  a->expect({top_ - 1, top_ - 2});
+  a->expect_of_releases(top_);
+  b.reset();
+  a->expect_of_releases(band_.timer);
+}
+
+// a has all rates of b: when b loses one, the order stays.
+TEST_F(EngineOrder, ReleasesFollowARateThatGoes) {
+  const auto a = member({10, 20, 30});
+  const auto b = member({20});
+  b->expect_of_releases(top_);
+  b->engine->set_timing(TaskId(0), 30 * kMillisecond, 30 * kMillisecond);
+  b->expect_of_releases(top_ - 1);
+}
+
+// An idle thread that waits in the place of the release thread.
+TEST_F(EngineOrder, ALeaderIsJustAboveTheOwnJobs) {
+  auto a = member({10});
+  pthread_t leader{};
+  Event called;
+  const Workload workload = testing::make_workload({make_dag("d", {{"t", 20}})});
+  EngineOptions options;
+  options.config = make_config(Mode{PreemptionMode::Os, {}}, 1, workload.policy, band_, 1);
+  options.band = band_;
+  options.band.shared = true;
+  options.order_folder = folder_;
+  ReleaseThread releases([] { return monotonic_now() + 3600 * kSecond; });
+  Engine engine(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
+  engine.bind(workload, {[&](const Job &) {
+                leader = pthread_self();
+                called.set();
+                return Outcome::Finished;
+              }});
+  engine.share_releases(releases);
+  ASSERT_TRUE(releases.start({.name = "releases", .fifo_priority = band_.timer, .cpus = {}}));
+  ASSERT_TRUE(engine.start());
+  engine.set_origin(monotonic_now());
+  engine.release(TaskId(0), engine.now());
+  called.wait();
+  const auto expect = [&](int wanted) {
+    for (const Time end = monotonic_now() + kPatience; fifo_priority(leader) != wanted && monotonic_now() < end;) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    EXPECT_EQ(fifo_priority(leader), wanted);
+  };
+  expect(top_);
+  a.reset();
+  expect(band_.timer);
+  releases.stop();
+  releases.join();
 }
 
 // A job of another executor can have a priority in between. `seen` is what the job's own thread has.

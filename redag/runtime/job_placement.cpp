@@ -20,7 +20,8 @@ JobPlacement::JobPlacement(WorkerPool &pool, WaitingJobs &waiting, bool os, cons
       band_(band),
       priorities_(os ? pool.size() : 0, band.top_job),
       mailboxes_(pool.size(), lookout),
-      spare_(spare) {
+      spare_(spare),
+      of_leader_(band_.timer) {
   moves_.reserve(os ? pool.size() : 0);
 }
 
@@ -153,10 +154,10 @@ void JobPlacement::end_lending(WorkerThread &thread, const Dispatch &dispatch, c
   wake_ups.wake(thread);
 }
 
-// With `os`, the leader is above all jobs while it waits, as the release thread is.
+// With `os`, the leader is above all jobs of the engine while it waits, as the release thread is.
 void JobPlacement::add_idle(WorkerThread &thread, bool may_lead) {
   const bool leads = mailboxes_.add_idle(thread, may_lead);
-  if (os_ && leads) apply(priorities_.wait(thread.index, band_.timer));
+  if (os_ && leads) apply(priorities_.wait(thread.index, of_leader_));
 }
 
 void JobPlacement::move_job(WorkerThread &from, WorkerThread &to, bool may_lead, Assignment &assignment) {
@@ -233,6 +234,15 @@ void JobPlacement::set_priority_for_job(WorkerThread &thread, const Assignment &
 void JobPlacement::apply(std::span<const ThreadPriorities::Change> changes) {
   for (const ThreadPriorities::Change &change : changes) {
     if (!set_fifo_priority(pool_[change.thread].handle.native_handle(), change.priority)) ++refused_priorities_;
+  }
+}
+
+void JobPlacement::set_leader(int priority) {
+  of_leader_ = priority;
+  for (const auto &thread : pool_.threads()) {
+    if (thread->stack.empty() && thread->leads.load(std::memory_order_relaxed)) {
+      apply(priorities_.wait(thread->index, of_leader_));
+    }
   }
 }
 

@@ -99,6 +99,7 @@ class JobPlacement {
   [[nodiscard]] std::uint32_t unfinished() const { return unfinished_; }
   /// Priority changes that the system refused.
   [[nodiscard]] std::uint64_t refused_priorities() const { return refused_priorities_; }
+  void count_refused() { ++refused_priorities_; }
 
   /// os: the priorities of the levels from now on, most urgent first. Threads that have jobs keep theirs until
   /// follow_levels(), or until the scheduler tells new levels.
@@ -106,6 +107,11 @@ class JobPlacement {
   /// os: gives the threads that have jobs the priorities of their levels. Meanwhile no two are in another order than
   /// before and after.
   void follow_levels();
+  /// os: the priority of the leader while it waits, in the place of the release thread.
+  void set_leader(int priority);
+  [[nodiscard]] int of_leader() const { return of_leader_; }
+  /// os: the priority of threads that release jobs, as it follows from the levels.
+  [[nodiscard]] int of_releases() const { return band_.of_releases(); }
   /// os: the priority of a job with this level.
   [[nodiscard]] int priority_of_level(std::uint32_t level) const { return band_.of_level(level); }
 
@@ -194,6 +200,7 @@ class JobPlacement {
   std::uint32_t unfinished_ = 0;
   std::uint64_t refused_priorities_ = 0;
   bool giving_way_ = false;
+  int of_leader_;  // os: its priority while it waits
 };
 
 }  // namespace redag::runtime

@@ -25,7 +25,20 @@ Result<void> ReleaseThread::start(const ThreadSetup &setup) {
     return make_error("the release timer needs a file descriptor, and the process may open no more files",
                       "raise the limit: ulimit -n");
   }
-  return start_thread(setup, [this] { main(); }).map([this](ThreadHandle &&thread) { thread_ = std::move(thread); });
+  const LockGuard guard(priority_lock_);
+  ThreadSetup own = setup;
+  if (priority_ > 0) own.fifo_priority = priority_;
+  Result<ThreadHandle> started = start_thread(own, [this] { main(); });
+  if (!started) return tl::unexpected(started.error());
+  thread_ = *std::move(started);
+  alive_ = thread_.native_handle();
+  return {};
+}
+
+bool ReleaseThread::set_priority(int priority) noexcept {
+  const LockGuard guard(priority_lock_);
+  if (std::exchange(priority_, priority) == priority || !alive_ || priority == 0) return true;
+  return set_fifo_priority(*alive_, priority);
 }
 
 Time ReleaseThread::release_due() {
@@ -59,6 +72,12 @@ void ReleaseThread::join() {
 }
 
 void ReleaseThread::main() noexcept {
+  run();
+  const LockGuard guard(priority_lock_);  // start() has left it
+  alive_.reset();
+}
+
+void ReleaseThread::run() noexcept {
   for (;;) {
     // Read before the clock: a stop seen here happened before the clock is read. Releases due by then are all made.
     const bool stopping = stopping_.load(std::memory_order_acquire);

@@ -8,8 +8,11 @@
 // Threads: any thread may call release_due() and changed(); one leader at a time. stop() is async-signal-safe.
 #pragma once
 
+#include <pthread.h>
+
 #include <atomic>
 #include <functional>
+#include <optional>
 
 #include "redag/base/alarm.hpp"
 #include "redag/base/atomic.hpp"
@@ -34,6 +37,9 @@ class ReleaseThread {
 
   /// Creates the thread. If there is one already, does nothing. Error: what the system refused.
   [[nodiscard]] Result<void> start(const ThreadSetup &setup);
+  /// Gives the thread this SCHED_FIFO priority, now or when it starts; 0: that of `setup`, which is the default. Any
+  /// thread may call it, with any lock. Returns false if the system refused.
+  bool set_priority(int priority) noexcept;
   /// The next release may have become earlier. Takes no lock.
   void changed() noexcept { alarm_.ring(); }
   /// Releases what is due, as the thread does. Returns the time of the next release; kNever: none is known, or stop()
@@ -57,6 +63,7 @@ class ReleaseThread {
 
  private:
   void main() noexcept;
+  void run() noexcept;
   Time expire() REDAG_REQUIRES(lock_);
   void set_alarm() REDAG_REQUIRES(lock_);
 
@@ -69,6 +76,9 @@ class ReleaseThread {
   std::atomic<Time> next_{kNever};  // written under the lock
   Alarm alarm_;
   Atomic<bool> stopping_{false};
+  PiMutex priority_lock_;  // never held while something is released
+  int priority_ REDAG_GUARDED_BY(priority_lock_) = 0;
+  std::optional<pthread_t> alive_ REDAG_GUARDED_BY(priority_lock_);  // the thread, until it ends
   ThreadHandle thread_;
 };
 

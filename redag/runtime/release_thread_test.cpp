@@ -45,6 +45,29 @@ TEST_F(ReleaseThreadTest, ReleasesWithoutALeader) {
   EXPECT_FALSE(by_leader);
 }
 
+// Before its start, while it waits, and after its end.
+TEST_F(ReleaseThreadTest, HasThePriorityThatItIsGiven) {
+  if (available_fifo_priority(3) < 3) GTEST_SKIP() << realtime_hint();
+  std::atomic<int> seen{0};
+  ReleaseThread raised([&] {
+    seen = fifo_priority(pthread_self());
+    released.set();
+    return kNever;
+  });
+  EXPECT_TRUE(raised.set_priority(2));
+  ASSERT_TRUE(raised.start({.name = "raised", .fifo_priority = 1, .cpus = {}}));
+  released.wait();
+  EXPECT_EQ(seen, 2);
+  EXPECT_TRUE(raised.set_priority(3));
+  raised.changed();
+  const Time end = monotonic_now() + kLong;
+  while (seen != 3 && monotonic_now() < end) std::this_thread::yield();
+  EXPECT_EQ(seen, 3);
+  raised.stop();
+  raised.join();
+  EXPECT_TRUE(raised.set_priority(1));
+}
+
 TEST_F(ReleaseThreadTest, LeavesTheReleaseToTheLeader) {
   ASSERT_TRUE(thread.start({}));
   due = monotonic_now() + kMillisecond;

@@ -39,6 +39,11 @@ PriorityBand band_up_to(int limit) {
   return PriorityBand{timer > 4 * kUserRoom ? timer - kUserRoom - 1 : timer - 1, timer};
 }
 
+int PriorityBand::of_releases() const {
+  const int most_urgent = of_level(0);
+  return most_urgent < band_up_to(timer).top_job ? most_urgent + 1 : timer;
+}
+
 PriorityBand probe_priority_band() { return band_up_to(available_fifo_priority(kHighestPriority)); }
 
 Result<PriorityBand> with_levels(PriorityBand band, const std::string &text) {

@@ -36,6 +36,9 @@ struct PriorityBand {
     if (given.empty()) return std::max(1, top_job - static_cast<int>(level));
     return level < given.size() ? given[level] : 1;
   }
+  /// Of the threads that release jobs. Where jobs of other processes can be more urgent than all of the executor's own,
+  /// it is just above the own ones, so that its releases do not delay those others.
+  [[nodiscard]] int of_releases() const;
 };
 
 /// The highest priority that an executor uses. Those above are left to the kernel's own threads.

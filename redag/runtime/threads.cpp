@@ -124,28 +124,55 @@ void leave_fifo() noexcept {
 
 }  // namespace
 
-Result<ThreadHandle> start_thread(const ThreadSetup &setup, std::function<void()> main) {
+BeforeOrdinaryThreads::BeforeOrdinaryThreads(bool wanted) {
+  if (!wanted || pthread_getschedparam(pthread_self(), &policy_, &parameters_) != 0) return;
+  const bool is_ordinary = policy_ != SCHED_FIFO && policy_ != SCHED_RR && policy_ != SCHED_DEADLINE;
+  raised_ = is_ordinary && set_fifo_priority(pthread_self(), 1);
+}
+
+BeforeOrdinaryThreads::~BeforeOrdinaryThreads() {
+  if (raised_) pthread_setschedparam(pthread_self(), policy_, &parameters_);
+}
+
+struct ThreadStart::State {
+  ThreadSetup setup;
   Result<void> result;
   Event ready;
   std::thread thread;
+};
+
+ThreadStart::ThreadStart(ThreadSetup setup, std::function<void()> main) : state_(std::make_shared<State>()) {
+  state_->setup = std::move(setup);
   try {
     const BlockedSignals inherited;
-    thread = std::thread([&setup, &result, &ready, main = std::move(main)] {
-      result = set_up_this_thread(setup);
-      const bool usable = result.has_value();
-      ready.set();
+    state_->thread = std::thread([state = state_, main = std::move(main)]() mutable {
+      state->result = set_up_this_thread(state->setup);
+      const bool usable = state->result.has_value();
+      state->ready.set();
+      state.reset();
       if (usable) main();
       leave_fifo();
     });
   } catch (const std::system_error &error) {
-    return make_error(fmt::format("thread '{}' cannot be created: {}", setup.name, error.what()),
-                      "check the limits on threads: 'ulimit -u', the pids limit of the container, and memory for "
-                      "stacks ('ulimit -s')");
+    state_->result = make_error(fmt::format("thread '{}' cannot be created: {}", state_->setup.name, error.what()),
+                                "check the limits on threads: 'ulimit -u', the pids limit of the container, and memory "
+                                "for stacks ('ulimit -s')");
   }
-  ready.wait();
-  if (result) return thread;
-  thread.join();
-  return tl::unexpected(result.error());
+}
+
+bool ThreadStart::created() const { return state_->thread.joinable(); }
+
+Result<ThreadHandle> ThreadStart::finish() {
+  std::thread thread = std::move(state_->thread);
+  if (thread.joinable()) state_->ready.wait();
+  if (state_->result) return thread;
+  if (thread.joinable()) thread.join();
+  return tl::unexpected(state_->result.error());
+}
+
+Result<ThreadHandle> start_thread(const ThreadSetup &setup, std::function<void()> main) {
+  const BeforeOrdinaryThreads promptly(setup.fifo_priority > 0);
+  return ThreadStart(setup, std::move(main)).finish();
 }
 
 int fifo_priority(pthread_t thread) noexcept {

@@ -6,11 +6,13 @@
 #pragma once
 
 #include <pthread.h>
+#include <sched.h>
 
 #include <cstddef>
 #include <cstdint>
 #include <ctime>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <thread>
@@ -44,9 +46,41 @@ inline constexpr std::size_t kTouchedStack = std::size_t{256} << 10;
 /// timer's lateness.) Error: the first thing that the system refused.
 [[nodiscard]] Result<void> set_up_this_thread(const ThreadSetup &setup);
 
+/// For the start of real-time threads. While it lives, the calling thread comes before ordinary threads, and never
+/// before a job: it has SCHED_FIFO priority 1, unless it has a real-time priority or may have none. On a busy machine,
+/// a new ordinary thread waits for several milliseconds for its first instruction, and so does the thread that waits
+/// for it. Threads that it creates inherit the priority.
+class BeforeOrdinaryThreads {
+ public:
+  explicit BeforeOrdinaryThreads(bool wanted);
+  ~BeforeOrdinaryThreads();
+  BeforeOrdinaryThreads(const BeforeOrdinaryThreads &) = delete;
+  BeforeOrdinaryThreads &operator=(const BeforeOrdinaryThreads &) = delete;
+
+ private:
+  bool raised_ = false;
+  int policy_ = 0;  // from before
+  sched_param parameters_{};
+};
+
 /// Creates a thread that is set up like this and then runs `main`. Returns once it is set up. It takes no signals but
 /// those that it causes itself (BlockedSignals). Error: as set_up_this_thread(), and `main` does not run.
 [[nodiscard]] Result<ThreadHandle> start_thread(const ThreadSetup &setup, std::function<void()> main);
+
+/// The same in two steps, so that several threads are set up at the same time.
+class ThreadStart {
+ public:
+  /// Creates the thread.
+  ThreadStart(ThreadSetup setup, std::function<void()> main);
+  /// Returns false if there can be no more threads.
+  [[nodiscard]] bool created() const;
+  /// Waits until the thread is set up. It must be called, and once.
+  [[nodiscard]] Result<ThreadHandle> finish();
+
+ private:
+  struct State;
+  std::shared_ptr<State> state_;
+};
 
 /// The clock of a running thread's processor time.
 [[nodiscard]] clockid_t cpu_clock_of(ThreadHandle &thread) noexcept;

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <csignal>
 #include <cstdint>
 #include <thread>
@@ -102,6 +103,68 @@ TEST(Threads, AThreadIsNoLongerUrgentWhenItsWorkIsDone) {
   EXPECT_EQ(at_its_end, 0);
 }
 
+TEST(Threads, ComeBeforeOrdinaryThreadsForAWhile) {
+  if (available_fifo_priority(5) < 5) GTEST_SKIP() << "this process may not use SCHED_FIFO 5";
+  std::thread([] {
+    int inherited = 0;
+    {
+      const BeforeOrdinaryThreads promptly(true);
+      EXPECT_EQ(fifo_priority(pthread_self()), 1);
+      { const BeforeOrdinaryThreads again(true); }
+      EXPECT_EQ(fifo_priority(pthread_self()), 1);
+      std::thread([&] { inherited = fifo_priority(pthread_self()); }).join();
+    }
+    EXPECT_EQ(inherited, 1);
+    EXPECT_EQ(fifo_priority(pthread_self()), 0);
+    {
+      const BeforeOrdinaryThreads unwanted(false);
+      EXPECT_EQ(fifo_priority(pthread_self()), 0);
+    }
+    ASSERT_TRUE(set_fifo_priority(pthread_self(), 5));
+    {
+      const BeforeOrdinaryThreads promptly(true);
+      EXPECT_EQ(fifo_priority(pthread_self()), 5) << "a real-time thread keeps its priority";
+    }
+    EXPECT_EQ(fifo_priority(pthread_self()), 5);
+  }).join();
+}
+
+// A thread that is started is ordinary again at its end, and so is the one that started it.
+TEST(Threads, AStartLeavesTheCallerAsItWas) {
+  if (available_fifo_priority(7) < 7) GTEST_SKIP() << "this process may not use SCHED_FIFO 7";
+  std::thread([] {
+    int seen = 0;
+    Result<ThreadHandle> thread = start_thread(ThreadSetup{"t", 7, {}}, [&] { seen = fifo_priority(pthread_self()); });
+    ASSERT_TRUE(thread) << to_string(thread.error());
+    thread->join();
+    EXPECT_EQ(seen, 7);
+    EXPECT_EQ(fifo_priority(pthread_self()), 0);
+    Result<ThreadHandle> ordinary =
+        start_thread(ThreadSetup{"u", 0, {}}, [&] { seen = fifo_priority(pthread_self()); });
+    ASSERT_TRUE(ordinary);
+    ordinary->join();
+    EXPECT_EQ(seen, 0);
+  }).join();
+}
+
+TEST(Threads, StartSideBySide) {
+  std::atomic<int> ran{0};
+  ThreadStart first(ThreadSetup{"first", 0, {}}, [&] { ++ran; });
+  ThreadStart refused(ThreadSetup{"refused", 0, {100000}}, [&] { ran += 100; });
+  ThreadStart last(ThreadSetup{"last", 0, {}}, [&] { ++ran; });
+  EXPECT_TRUE(refused.created());
+  Result<ThreadHandle> one = first.finish();
+  Result<ThreadHandle> none = refused.finish();
+  Result<ThreadHandle> two = last.finish();
+  ASSERT_TRUE(one);
+  ASSERT_TRUE(two);
+  one->join();
+  two->join();
+  EXPECT_EQ(ran, 2);
+  ASSERT_FALSE(none);
+  EXPECT_NE(to_string(none.error()).find("processor 100000"), std::string::npos);
+}
+
 /// Counts the pages below the caller's frame on its stack that are in memory.
 std::size_t resident_pages_below(std::size_t bytes) {
   const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
@@ -161,6 +224,13 @@ TEST(ResolveMode, TheMostUrgentLevelHasTheTopPriorityAndTheLastOneIsValid) {
   EXPECT_EQ(kBand.of_level(kBand.levels()), 1) << "of demoted jobs";
   const PriorityBand band = probe_priority_band();
   EXPECT_TRUE(band.top_job == 0 || band.timer > band.top_job);
+}
+
+TEST(PriorityBand, ReleasesComeAfterMoreUrgentJobsOfOthers) {
+  EXPECT_EQ(kBand.of_releases(), 90);
+  EXPECT_EQ(with_levels(kBand, "80,70")->of_releases(), 90) << "its own jobs are the most urgent ones";
+  EXPECT_EQ(with_levels(kBand, "79,70")->of_releases(), 80);
+  EXPECT_EQ(with_levels(kBand, "2")->of_releases(), 3);
 }
 
 TEST(Setup, TheTimerOutranksWorkersThatInheritAPriority) {

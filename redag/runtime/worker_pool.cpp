@@ -29,15 +29,26 @@ WorkerPool::WorkerPool(std::uint32_t threads, std::size_t trace_capacity) : call
 
 Result<void> WorkerPool::start(ThreadSetup setup, const std::function<void(WorkerThread &)> &main) {
   const std::string prefix = setup.name + "-";
+  const BeforeOrdinaryThreads promptly(setup.fifo_priority > 0);
+  std::vector<ThreadStart> starts;
+  starts.reserve(threads_.size());
   for (auto &thread : threads_) {
     setup.name = prefix + std::to_string(thread->index);
     setup.processor = &thread->processor;
-    Result<ThreadHandle> started = start_thread(setup, [main, &self = *thread] { main(self); });
-    if (!started) return tl::unexpected(started.error());
-    thread->handle = *std::move(started);
-    thread->cpu_clock = cpu_clock_of(thread->handle);
+    starts.emplace_back(setup, [main, &self = *thread] { main(self); });
+    if (!starts.back().created()) break;
   }
-  return {};
+  Result<void> result;
+  for (std::size_t i = 0; i < starts.size(); ++i) {
+    Result<ThreadHandle> started = starts[i].finish();
+    if (started) {
+      threads_[i]->handle = *std::move(started);
+      threads_[i]->cpu_clock = cpu_clock_of(threads_[i]->handle);
+    } else if (result) {
+      result = tl::unexpected(started.error());
+    }
+  }
+  return result;
 }
 
 void WorkerPool::end() {

@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The bounds of the union against what really runs: a scheduler for each process, which knows only its own jobs, and a
-// kernel below them, which runs the m most urgent started jobs of all processes. Virtual time, tick by tick.
+// kernel below them, which runs the m most urgent started jobs of all processes. A process learns of a release when the
+// kernel runs its thread for releases, which takes no time. Virtual time, tick by tick.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -47,6 +48,17 @@ class SimulatedProcess {
       : tasks_(flatten(workload)), band_(band), scheduler_(workload, config(workload, band, workers, ties)) {}
 
   void release(TaskId task, Time nominal, Time now) { scheduler_.release(task, nominal, now); }
+
+  // For the thread for releases.
+  void expect(TaskId task, Time nominal, int priority, std::uint64_t &sequence) {
+    if (due_.empty()) releasing_ = Job{.priority = priority, .since = ++sequence};
+    due_.emplace_back(task, nominal);
+  }
+  [[nodiscard]] Job *releasing() { return due_.empty() ? nullptr : &releasing_; }
+  void release_due(Time now) {
+    for (const auto &[task, nominal] : due_) release(task, nominal, now);
+    due_.clear();
+  }
 
   // Ends the jobs that are done. Calls `finished` for each.
   template <class Finished>
@@ -98,18 +110,46 @@ class SimulatedProcess {
   runtime::PriorityBand band_;
   sched::PriorityScheduler scheduler_;
   std::map<std::uint32_t, Job> jobs_;
+  std::vector<std::pair<TaskId, Time>> due_;  // releases that the process has not learned of
+  Job releasing_;                             // its thread for releases, while there are some
 };
 
-// Runs the most urgent jobs for one tick. One that runs is not preempted by its equals.
-void run_kernel(std::deque<SimulatedProcess> &processes, std::size_t cpus) {
+// All jobs and threads for releases, in the kernel's order. A job that runs is not preempted by its equals.
+std::vector<SimulatedProcess::Job *> in_order(std::deque<SimulatedProcess> &processes) {
   std::vector<SimulatedProcess::Job *> ready;
   for (SimulatedProcess &process : processes) {
     for (auto &[slot, job] : process.jobs()) ready.push_back(&job);
+    if (process.releasing() != nullptr) ready.push_back(process.releasing());
   }
   std::sort(ready.begin(), ready.end(), [](const auto *a, const auto *b) {
     if (a->priority != b->priority) return a->priority > b->priority;
     return a->runs != b->runs ? a->runs : a->since < b->since;
   });
+  return ready;
+}
+
+// Runs the threads for releases that have a processor, one after the other: each can start jobs.
+void run_releases(std::deque<SimulatedProcess> &processes, std::size_t cpus, Time now, Rng &rng,
+                  std::uint64_t &sequence) {
+  const auto has_processor = [&](SimulatedProcess &process) {
+    const auto ready = in_order(processes);
+    const auto end = ready.begin() + static_cast<std::ptrdiff_t>(std::min(cpus, ready.size()));
+    return process.releasing() != nullptr && std::find(ready.begin(), end, process.releasing()) != end;
+  };
+  for (auto process = processes.begin(); process != processes.end();) {
+    if (!has_processor(*process)) {
+      ++process;
+      continue;
+    }
+    process->release_due(now);
+    process->dispatch(now, rng, sequence);
+    process = processes.begin();
+  }
+}
+
+// Runs the most urgent jobs for one tick.
+void run_kernel(std::deque<SimulatedProcess> &processes, std::size_t cpus) {
+  const std::vector<SimulatedProcess::Job *> ready = in_order(processes);
   for (std::size_t i = 0; i < ready.size(); ++i) {
     ready[i]->runs = i < cpus;
     if (ready[i]->runs) ready[i]->left -= kTick;
@@ -150,9 +190,10 @@ bool is_linked(const Robot &robot, std::size_t process, TaskId task) {
                      [&](const Link &link) { return link.to.process == process && link.to.task == task; });
 }
 
-// Simulates the processes, and compares each response with the bound of the task in the union.
+// Simulates the processes, and compares each response with the bound of the task in the union. `lowered`: how far the
+// threads for releases are below their priority.
 Observed observe(const Robot &robot, const Plan &plan, const analysis::Report &report, std::size_t cpus,
-                 std::uint64_t seed) {
+                 std::uint64_t seed, int lowered = 0) {
   Rng rng(seed);
   std::deque<SimulatedProcess> processes;  // which cannot be moved
   struct Timer {
@@ -162,6 +203,7 @@ Observed observe(const Robot &robot, const Plan &plan, const analysis::Report &r
     Duration period;
   };
   std::vector<Timer> timers;
+  std::vector<int> of_releases;         // by process
   std::vector<std::size_t> first_task;  // of the process in the union
   std::vector<std::size_t> first_dag;
   std::size_t dags = 0;
@@ -173,6 +215,7 @@ Observed observe(const Robot &robot, const Plan &plan, const analysis::Report &r
     const auto workers = static_cast<std::uint32_t>(cpus) + testing::between(rng, 0, 2);
     const Ties ties = testing::chance(rng, 0.5) ? Ties::Share : Ties::Fixed;
     processes.emplace_back(workload, band, workers, ties);
+    of_releases.push_back(std::max(1, band.of_releases() - lowered));
     std::vector<Duration> offsets;  // those of a DAG stay aligned
     for (const Dag &dag : workload.dags) {
       Duration period = kTick;
@@ -231,10 +274,11 @@ Observed observe(const Robot &robot, const Plan &plan, const analysis::Report &r
     });
     for (Timer &timer : timers) {
       if (timer.next > now) continue;
-      processes[timer.process].release(timer.task, timer.next, now);
+      processes[timer.process].expect(timer.task, timer.next, of_releases[timer.process], sequence);
       timer.next += timer.period;
     }
     for (SimulatedProcess &process : processes) process.dispatch(now, rng, sequence);
+    run_releases(processes, cpus, now, rng, sequence);
     run_kernel(processes, cpus);
   }
   return observed;
@@ -379,6 +423,18 @@ TEST(RobotUnionBounds, BreakWhereDataAreTakenToBeThere) {
     if (!observe(robot, analysed_without.plan, analysed_without.report, 2, seed).violation.empty()) ++violations;
   }
   EXPECT_GT(violations, 5U);
+}
+
+// The same comparison, where less urgent jobs of other processes delay releases: it notices.
+TEST(RobotUnionBounds, BreakWhereReleasesAreLessUrgentThanJobs) {
+  std::uint64_t violations = 0;
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+    Rng rng(seed);
+    const Robot robot = random_robot(rng, {0, 1});
+    const auto [plan, report] = analysed(robot, 90);
+    if (!observe(robot, plan, report, 2, seed, 90).violation.empty()) ++violations;
+  }
+  EXPECT_GT(violations, 10U);
 }
 
 // The same comparison, where the kernel has one processor less than the union: it notices.

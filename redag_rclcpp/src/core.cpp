@@ -326,10 +326,6 @@ void ReDAGExecutor::Core::spin() {
   std::optional<RaisedMiddleware> middleware;
   if (setup_.timer_priority() > 0) middleware.emplace(options_.raise_middleware ? setup_.timer_priority() : 0);
   start();
-  if (middleware) {
-    report(*middleware, false);
-    look_at_middleware_at_ = engine_->now() + kThreadsAppear;
-  }
   registry_.collect();
   direct_ = true;
   timer_.resume();
@@ -349,6 +345,10 @@ void ReDAGExecutor::Core::spin() {
       Core &core;
       std::thread thread;
     } join{*this, *std::move(watcher)};
+    if (middleware) {
+      report(*middleware, false);
+      look_at_middleware_at_ = engine_->now() + kThreadsAppear;
+    }
     const struct Follow {
       explicit Follow(Lockstep *its) : lockstep(its) {
         if (lockstep != nullptr) lockstep->open();

@@ -149,6 +149,35 @@ Figures publish_latency(rclcpp::Executor &executor, double seconds, bool intra_p
   return {{"p50_us", latency.at(0.5)}, {"p99_us", latency.at(0.99)}};
 }
 
+// Time from spin() to the callback for a message that was there before, and from cancel() to the end of spin().
+Figures start_and_stop(rclcpp::Executor &executor) {
+  auto node = std::make_shared<rclcpp::Node>("bench");
+  std::atomic<std::int64_t> called{0};
+  auto subscription = node->create_subscription<Message>("start", rclcpp::QoS(10), [&](const Message &) {
+    called = now_ns();
+    called.notify_one();
+  });
+  auto publisher = node->create_publisher<Message>("start", rclcpp::QoS(10));
+  executor.add_node(node);
+  publisher->publish(Message());
+  std::this_thread::sleep_for(20ms);
+  std::int64_t began = 0;
+  std::int64_t ended = 0;
+  std::thread spinning([&] {
+    began = now_ns();
+    executor.spin();
+    ended = now_ns();
+  });
+  called.wait(0);
+  std::this_thread::sleep_for(20ms);
+  const std::int64_t cancelled = now_ns();
+  executor.cancel();
+  spinning.join();
+  executor.remove_node(node);
+  return {{"start_ms", static_cast<double>(called - began) / 1e6},
+          {"stop_ms", static_cast<double>(ended - cancelled) / 1e6}};
+}
+
 // Callbacks in a second while a ring of `count` subscriptions keeps the executor busy.
 Figures saturation(rclcpp::Executor &executor, double seconds, std::size_t count) {
   std::atomic<std::uint64_t> calls{0};
@@ -242,6 +271,7 @@ struct Measurement {
 
 std::vector<Measurement> measurements() {
   return {
+      {"start_and_stop", [](auto &e, double) { return start_and_stop(e); }},
       {"timer_idle", [](auto &e, double s) { return timer_lateness(e, s, 10ms, 0ms); }},
       {"timer_loaded", [](auto &e, double s) { return timer_lateness(e, s, 10ms, 60ms); }},
       {"timer_1khz_loaded", [](auto &e, double s) { return timer_lateness(e, s, 1ms, 6ms); }},

@@ -395,6 +395,63 @@ TEST_F(Lockstep, TwoExecutorsGoTogether) {
   }
 }
 
+/// One instant with a message on each of these topics.
+class OneInstant final : public Recording {
+ public:
+  explicit OneInstant(std::vector<std::string> names) {
+    for (std::string &name : names) topics_.push_back({std::move(name), "std_msgs/msg/UInt64"});
+  }
+  [[nodiscard]] const std::vector<RecordedTopic> &topics() const override { return topics_; }
+  [[nodiscard]] redag::Result<bool> next(RecordedMessage &message) override {
+    if (at_ == topics_.size()) return false;
+    message.time = kStart;
+    message.topic = at_++;
+    const UInt64 content;
+    rclcpp::Serialization<UInt64>().serialize_message(&content, &message.data);
+    return true;
+  }
+  [[nodiscard]] redag::Result<void> rewind() override {
+    at_ = 0;
+    return {};
+  }
+
+ private:
+  std::vector<RecordedTopic> topics_;
+  std::size_t at_ = 0;
+};
+
+// All callbacks have one priority, and the oldest data go first. The first message that "one" publishes is as old as
+// its own data. The second one has the turn of its publication, which comes after what the instant began with.
+TEST_F(Lockstep, WhatAJobPublishesHasTheTurnOfThatJob) {
+  Robot robot;
+  const auto one = robot.node("one");
+  const auto other = robot.node("other");
+  const auto then = robot.node("then");
+  Record record;
+  const auto publisher = one->create_publisher<UInt64>("/then", 10);
+  const auto first = one->create_subscription<UInt64>("/first", 10, [&](const UInt64 &) {
+    record.add(*one, "/first");
+    for (std::uint64_t i = 1; i <= 2; ++i) {
+      UInt64 message;
+      message.data = i;
+      publisher->publish(message);
+    }
+  });
+  const auto second =
+      other->create_subscription<UInt64>("/second", 10, [&](const UInt64 &) { record.add(*other, "/second"); });
+  const auto published = then->create_subscription<UInt64>(
+      "/then", 10, [&](const UInt64 &message) { record.add(*then, "/then", message.data); });
+  ReDAGExecutor executor(options());
+  for (const auto &node : {one, other, then}) executor.add_node(node);
+  const Spinner spinner(executor);
+  OneInstant recording({"/first", "/second"});
+  LockstepPlayer player(player_node(), play());
+  const auto result = player.play(recording);
+  ASSERT_TRUE(result) << to_string(result.error());
+  EXPECT_THAT(record.lines(),
+              testing::ElementsAre("0 one /first 0", "0 then /then 1", "0 other /second 0", "0 then /then 2"));
+}
+
 TEST_F(Lockstep, ASubscriptionMadeByACallbackGetsTheNextMessages) {
   Robot robot;
   const auto late = robot.node("late");

@@ -48,8 +48,9 @@ std::string describe(const robot::Robot &robot, const robot::Plan &plan, const S
   std::string text =
       fmt::format("{}: one order by {}", tinted(robot.name, Tint::Strong, terminal.colour), order_name(robot));
   if (plan.levels.empty()) return text + ", without tasks\n";
-  text += fmt::format(", SCHED_FIFO {} to {}; timers of executors at {}\n", plan.levels.front().priority,
-                      plan.levels.back().priority, plan.band.timer);
+  text += fmt::format(", SCHED_FIFO {} to {}\n", plan.levels.front().priority, plan.levels.back().priority);
+  text +=
+      fmt::format("timers of executors: {} with the most urgent task, else just above their own\n", plan.band.timer);
   if (order.is_merged()) {
     text += fmt::format(
         "{} of {} {} share a level with others, because there are {} levels: they do not preempt each other\n",
