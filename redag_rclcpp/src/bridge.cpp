@@ -11,6 +11,15 @@
 
 namespace redag_rclcpp {
 
+namespace {
+
+// After a wait that ended for nothing. With rmw_fastrtps, a wait for a QoS event of a subscription ends at once while
+// the subscription has messages. Only a job takes these, and a thread that waits again and again is more urgent than
+// jobs: it could keep the job from its processor for ever.
+constexpr auto kUntilNextWait = std::chrono::milliseconds(1);
+
+}  // namespace
+
 Bridge::Bridge(rclcpp::Context::SharedPtr context)
     : context_(std::move(context)), wake_(context_), set_(rcl_get_zero_initialized_wait_set()) {
   check_rcl(rcl_wait_set_init(&set_, 0, 1, 0, 0, 0, 0, context_->get_rcl_context().get(), rcl_get_default_allocator()),
@@ -94,9 +103,14 @@ void Bridge::wait(std::chrono::nanoseconds timeout) {
   if (result == RCL_RET_TIMEOUT) return;
   check_rcl(result, "waiting failed");
 
+  bool is_any_ready = std::any_of(set_.guard_conditions, set_.guard_conditions + conditions_.size(),
+                                  [](const auto *condition) { return condition != nullptr; });
   for (const Entry &entry : entries) {
-    if (entry.held.entity && entry.member->is_ready(entry.held, set_)) entry.member->seen_by_wait_set();
+    if (!entry.held.entity || !entry.member->is_ready(entry.held, set_)) continue;
+    is_any_ready = true;
+    entry.member->seen_by_wait_set();
   }
+  if (!is_any_ready) std::this_thread::sleep_for(kUntilNextWait);
 }
 
 void Bridge::fill(rcl_wait_set_t &set, const std::vector<const rclcpp::GuardCondition *> &conditions,

@@ -59,18 +59,33 @@ inline void execute(rclcpp::Waitable &waitable, std::shared_ptr<void> &data) { w
 /// - Before Lyrical action servers report expired goals to wait sets only (rclcpp issue 2661). Fixes for some versions
 ///   of Jazzy and Kilted cannot be told from here. There the wait set costs nothing but the exact arrival times of
 ///   goals.
-/// - Action clients and QoS events of Humble call the hook with too few arguments for arrivals before it was set.
+/// - Action clients of Humble call the hook with too few arguments for arrivals before it was set.
 inline bool needs_wait_set(const rclcpp::Waitable &waitable) {
 #if RCLCPP_VERSION_MAJOR < 32
   if (dynamic_cast<const rclcpp_action::ServerBase *>(&waitable) != nullptr) return true;
 #endif
 #if RCLCPP_VERSION_MAJOR < 21
-  return dynamic_cast<const rclcpp_action::ClientBase *>(&waitable) != nullptr ||
-         dynamic_cast<const rclcpp::QOSEventHandlerBase *>(&waitable) != nullptr;
+  return dynamic_cast<const rclcpp_action::ClientBase *>(&waitable) != nullptr;
 #else
   (void)waitable;
   return false;
 #endif
+}
+
+/// The middleware's part of a QoS event, if its hook has to be set below rclcpp. Humble's QoS events call their on-ready
+/// hook with too few arguments for events before it was set. Null for all other waitables.
+inline std::shared_ptr<rcl_event_t> event_to_hook(const rclcpp::Waitable::SharedPtr &waitable) {
+#if RCLCPP_VERSION_MAJOR < 21
+  struct Opened : rclcpp::QOSEventHandlerBase {
+    using QOSEventHandlerBase::event_handle_;
+  };
+  if (const auto event = std::dynamic_pointer_cast<rclcpp::QOSEventHandlerBase>(waitable)) {
+    return {event, &((*event).*(&Opened::event_handle_))};
+  }
+#else
+  (void)waitable;
+#endif
+  return nullptr;
 }
 
 /// The timers of a waitable. An executor that waits for the waitable's hook has to call them when they are due. Since
@@ -139,7 +154,8 @@ inline bool is_hooked_by_user(rclcpp::ClientBase &client) {
   };
   return detail::is_set(client, &Opened::callback_mutex_, &Opened::on_new_response_callback_);
 }
-/// Of the waitables only QoS events offer users such a callback. The executor's own hook counts as well.
+/// Of the waitables only QoS events offer users such a callback. The executor's own hook counts as well, unless it was
+/// set below rclcpp.
 inline bool is_hooked_by_user(rclcpp::Waitable &waitable) {
 #if RCLCPP_VERSION_MAJOR < 21
   using EventHandler = rclcpp::QOSEventHandlerBase;

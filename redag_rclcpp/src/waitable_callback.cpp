@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Waitables as callbacks: action servers and clients, QoS events, and what users derive from rclcpp::Waitable.
+#include <rcl/event_callback.h>
+
 #include <atomic>
 #include <memory>
 #include <utility>
@@ -10,6 +12,7 @@
 #include "arrival_callback.hpp"
 #include "compat.hpp"
 #include "entities.hpp"
+#include "hook.hpp"
 #include "stand_in.hpp"
 
 namespace redag_rclcpp {
@@ -79,6 +82,15 @@ class WaitableCallback final : public ArrivalCallback, public ActionClientCallba
   void hook() override {
     const auto waitable = waitable_.lock();
     if (!waitable) return;
+    if (const auto event = compat::event_to_hook(waitable)) {
+      event_hook_.set<rcl_event_t>(
+          event,
+          [](rcl_event_t &entity, rcl_event_callback_t call, const void *ticket) {
+            return rcl_event_set_callback(&entity, call, ticket);
+          },
+          self());
+      return;
+    }
     hooked_ = true;
     waitable->set_on_ready_callback(
         [self = std::static_pointer_cast<WaitableCallback>(shared_from_this())](std::size_t count, int part) {
@@ -87,6 +99,7 @@ class WaitableCallback final : public ArrivalCallback, public ActionClientCallba
         });
   }
   void unhook() override {
+    event_hook_.clear();
     const auto waitable = waitable_.lock();
     if (!waitable || !hooked_) return;  // without a hook of ours, it may be the user's
     hooked_ = false;
@@ -122,7 +135,8 @@ class WaitableCallback final : public ArrivalCallback, public ActionClientCallba
 
   const std::weak_ptr<rclcpp::Waitable> waitable_;
   const Exchange exchange_;
-  bool hooked_ = false;                                 // hook() was called, even if it failed
+  Hook event_hook_;                                     // of a QoS event whose hook is set below rclcpp
+  bool hooked_ = false;                                 // hook() has set the on-ready hook, even if that failed
   std::atomic<redag::AsyncEvent *> stand_in_{nullptr};  // of the job that stands in; written under lock_
 };
 

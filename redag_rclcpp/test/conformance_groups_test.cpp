@@ -132,6 +132,8 @@ TYPED_TEST(Conformance, EntitiesAndGroupsCreatedWhileSpinningAreServed) {
     publisher->publish(Empty());
     return third > 2 && received > 2;
   }));
+  // Humble's rmw_fastrtps crashes if rclcpp's own executors wait for a subscription that is being destroyed.
+  if (!kOurs<TypeParam>) spinner.stop();
 }
 
 TYPED_TEST(Conformance, AManuallyAddedGroupIsServedUntilItIsRemoved) {

@@ -5,6 +5,8 @@
 // wakes.
 #pragma once
 
+#include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -15,6 +17,7 @@ namespace redag_rclcpp {
 struct ProcessTask {
   std::string name;
   std::uint64_t switches = 0;  // voluntary switches: how often the thread went to sleep
+  std::chrono::nanoseconds processor_time{0};
 };
 
 /// Threads by id. Threads that end meanwhile are left out.
@@ -29,6 +32,8 @@ inline std::map<int, ProcessTask> process_tasks() {
     for (std::string key; status >> key;) {
       if (key == "voluntary_ctxt_switches:") status >> task.switches;
     }
+    std::int64_t time = 0;
+    if (std::ifstream(entry.path() / "schedstat") >> time) task.processor_time = std::chrono::nanoseconds(time);
     tasks[std::stoi(entry.path().filename())] = task;
   }
   return tasks;

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Tests what the executor requests from Linux: priorities of its own threads, locked memory, and threads. Includes
-// threads that cannot be created, and jobs that do not end.
+// threads that cannot be created, messages that wait, and jobs that do not end.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sched.h>
@@ -26,6 +26,7 @@
 #include "any_waitable.hpp"
 #include "log_capture.hpp"
 #include "mode_test.hpp"
+#include "process_tasks.hpp"
 #include "rclcpp/waitable.hpp"
 #include "redag/runtime/parker.hpp"
 #include "redag/runtime/threads.hpp"
@@ -205,6 +206,54 @@ TEST_P(RealtimeTest, LockedMemoryIsThereBeforeCallbacksNeedIt) {
   }
   EXPECT_EQ(absent, 0U);
   munlockall();
+}
+
+// ---- messages that wait ----
+
+/// Processor time of the thread that waits for what has no hooks.
+std::chrono::nanoseconds time_of_wait_set() {
+  for (const auto &[id, task] : process_tasks()) {
+    if (task.name == "redag-wait") return task.processor_time;
+  }
+  return std::chrono::nanoseconds(-1);
+}
+
+// rmw_fastrtps ends a wait for a QoS event at once while the event's subscription has messages. The executor waits so
+// for an event that the user has hooked.
+TEST_P(RealtimeTest, AMessageThatWaitsForItsGroupTakesNoProcessor) {
+  const auto group = new_group();
+  rclcpp::SubscriptionOptions with_event;
+  with_event.callback_group = group;
+  with_event.event_callbacks.deadline_callback = [](rclcpp::QOSDeadlineRequestedInfo &) {};
+  std::atomic<int> received{0};
+  const rclcpp::QoS qos = rclcpp::QoS(10).deadline(1h);
+  const auto subscription = node->create_subscription<Empty>(
+      "/waits", qos, [&](Empty::ConstSharedPtr) { ++received; }, with_event);
+  subscription->set_on_new_qos_event_callback([](std::size_t) {}, RCL_SUBSCRIPTION_REQUESTED_DEADLINE_MISSED);
+  const auto elsewhere = std::make_shared<rclcpp::Node>("elsewhere");  // sends through the middleware
+  const auto out = elsewhere->create_publisher<Empty>("/waits", qos);
+  Event holds_group;
+  Event end;
+  const auto timer = node->create_wall_timer(
+      1ms,
+      [&] {
+        holds_group.set();
+        end.wait();
+      },
+      group);
+  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  executor.add_node(node);
+  ASSERT_TRUE(eventually([&] { return out->get_subscription_count() == 1; }));
+  const Spinner spinner(executor);
+  holds_group.wait();
+  const std::chrono::nanoseconds before = time_of_wait_set();
+  ASSERT_GE(before, 0ns);
+  out->publish(Empty());
+  std::this_thread::sleep_for(300ms);
+  EXPECT_LT(time_of_wait_set() - before, 150ms);
+  EXPECT_EQ(received, 0);
+  end.set();
+  EXPECT_TRUE(eventually([&] { return received == 1; }));
 }
 
 // ---- jobs that do not end ----
