@@ -181,6 +181,8 @@ struct Platform {
   PreemptionMode preemption = PreemptionMode::Auto;
   std::vector<Cluster> clusters = {};  // empty: all workers serve all DAGs
   std::vector<Device> devices = {};
+  /// Not one scheduler but several start the jobs, each without knowing those of the others: the processes of a robot.
+  bool several_executors = false;
 
   friend bool operator==(const Platform &, const Platform &) = default;
 };

@@ -8,11 +8,10 @@
 // Threads: any thread may call release_due() and changed(); one leader at a time. stop() is async-signal-safe.
 #pragma once
 
-#include <pthread.h>
-
 #include <atomic>
 #include <functional>
 #include <optional>
+#include <utility>
 
 #include "redag/base/alarm.hpp"
 #include "redag/base/atomic.hpp"
@@ -78,7 +77,8 @@ class ReleaseThread {
   Atomic<bool> stopping_{false};
   PiMutex priority_lock_;  // never held while something is released
   int priority_ REDAG_GUARDED_BY(priority_lock_) = 0;
-  std::optional<pthread_t> alive_ REDAG_GUARDED_BY(priority_lock_);  // the thread, until it ends
+  // The thread, until it ends.
+  std::optional<decltype(std::declval<ThreadHandle &>().native_handle())> alive_ REDAG_GUARDED_BY(priority_lock_);
   ThreadHandle thread_;
 };
 

@@ -25,6 +25,7 @@ class Compiler {
       : workload_(workload), waits_(waiting_times(workload)) {
     task_set_.platform = platform;
     task_set_.devices = workload.platform.devices;
+    task_set_.several_executors = workload.platform.several_executors;
     task_set_.policy = workload.policy;
     task_set_.ties = workload.ties;
     task_set_.mode = platform.preemption;

@@ -145,6 +145,7 @@ struct TaskSet {
   std::vector<std::uint32_t> by_rank;              // TaskIds, most urgent first
   std::vector<std::vector<std::uint32_t>> groups;  // TaskIds of each group
   std::vector<Device> devices;                     // of the platform
+  bool several_executors = false;                  // Platform::several_executors
   double utilization = 0;                          // processor time / period, overheads included; only to be shown
   /// Features that no bound covers, such as a budget below the wcet or a queue that is too small. Every method then
   /// answers NotApplicable with this reason.

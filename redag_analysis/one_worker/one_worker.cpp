@@ -127,6 +127,10 @@ std::optional<std::string> why_not(const TaskSet &task_set) {
   if (task_set.mode == sched::Preemption::Cooperative) {
     return "in cooperative mode with groups, less urgent jobs can run on top of the holder";
   }
+  if (task_set.several_executors) {
+    return "with groups and several executors on the processor, a less urgent job can take its group while it does not "
+           "run, and be run for a more urgent one, again and again";
+  }
   if (task_set.platform.preempt_overhead > 0) return "groups cannot be combined with an overhead of preemption";
   return std::nullopt;
 }

@@ -62,6 +62,9 @@ class Union {
     first_task_.push_back(levels_.size());
     if (!process.workload) return;
     check_executor(p);
+    // More threads than processors: a job of the process can be started beside a more urgent one.
+    const bool has_more_threads = process.workload->platform.workers > robot_.cpu_sets[process.cpu_set].cpus.size();
+    starters_ += process.states_workers && has_more_threads ? 2 : 1;
     if (process.name == kThreads) {
       refuse(process.place, "the name 'threads' of a process is that of all threads in the union",
              "choose another name");
@@ -184,6 +187,7 @@ class Union {
     Dag &dag = workload_.dags.emplace_back();
     dag.name = joined(kThreads, threads.name);
     dag.is_foreign = true;
+    ++starters_;
     for (std::uint32_t i = 0; i < threads.count; ++i) {
       task.name = threads.count == 1 ? "run" : fmt::format("run_{}", i + 1);
       dag.tasks.push_back(task);
@@ -222,6 +226,7 @@ class Union {
     used.erase(std::unique(used.begin(), used.end()), used.end());
     Platform &platform = workload_.platform;
     platform.workers = 0;
+    platform.several_executors = starters_ > 1;
     for (const std::size_t s : used) {
       const CpuSet &set = robot_.cpu_sets[s];
       const auto workers = static_cast<std::uint32_t>(set.cpus.size());
@@ -255,6 +260,7 @@ class Union {
   std::vector<std::size_t> first_task_;  // by process: the first of its tasks in the union
   std::vector<std::optional<std::size_t>> first_of_threads_;
   std::map<std::size_t, std::size_t> reserved_;  // by CPU set: threads with reservations
+  std::size_t starters_ = 0;                     // what starts jobs without knowing of the others
   bool has_above_ = false;                       // some task is above all levels of the order
 };
 

@@ -62,6 +62,22 @@ inline std::optional<std::string> thread_that_fails;  // name of the thread that
   if (thread_that_fails == setup.name) return make_error("thread '" + setup.name + "' cannot be created");
   return ThreadHandle(testing::explored::spawn(std::move(main)));
 }
+
+struct BeforeOrdinaryThreads {
+  explicit BeforeOrdinaryThreads(bool) {}
+};
+
+class ThreadStart {
+ public:
+  ThreadStart(const ThreadSetup &setup, std::function<void()> main) : started_(start_thread(setup, std::move(main))) {}
+
+  [[nodiscard]] bool created() const { return started_.has_value(); }
+  [[nodiscard]] Result<ThreadHandle> finish() { return std::move(started_); }
+
+ private:
+  Result<ThreadHandle> started_;
+};
+
 [[nodiscard]] inline clockid_t cpu_clock_of(ThreadHandle &) noexcept { return 0; }
 [[nodiscard]] inline int processor_of(ProcessorWord) noexcept { return -1; }
 [[nodiscard]] inline ProcessorWord this_threads_processor() noexcept { return nullptr; }
