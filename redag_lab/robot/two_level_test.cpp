@@ -156,14 +156,14 @@ void run_kernel(std::deque<SimulatedProcess> &processes, std::size_t cpus) {
   }
 }
 
-Workload random_process(Rng &rng, double most_load) {
+Workload random_process(Rng &rng, double most_load, double groups) {
   testing::BoundCaseLimits limits;
   limits.min_workers = limits.max_workers = 2;
   limits.policies = {PolicyKind::RateMonotonic};
   limits.edges = testing::chance(rng, 0.6);
   limits.max_dags = 3;
   limits.max_tasks = 3;
-  limits.groups = testing::chance(rng, 0.4);
+  limits.groups = testing::chance(rng, groups);
   limits.caps = testing::chance(rng, 0.4);
   limits.min_utilization = most_load / 5;
   limits.max_utilization = most_load;
@@ -284,14 +284,15 @@ Observed observe(const Robot &robot, const Plan &plan, const analysis::Report &r
   return observed;
 }
 
-Robot random_robot(Rng &rng, std::vector<int> cpus, double most_load = 0.5) {
+// `groups`: the share of the processes that have groups.
+Robot random_robot(Rng &rng, std::vector<int> cpus, double most_load = 0.5, double groups = 0.4) {
   Robot robot;
   robot.name = "r";
   robot.cpu_sets = {CpuSet{"", std::move(cpus)}};
   for (std::uint32_t p = testing::between(rng, 2, 3); p > 0; --p) {
     Process process;
     process.name = fmt::format("p{}", p);
-    process.workload = random_process(rng, most_load);
+    process.workload = random_process(rng, most_load, groups);
     robot.processes.push_back(std::move(process));
   }
   return robot;
@@ -358,6 +359,43 @@ TEST(RobotUnionBounds, HoldForSchedulersAboveOneKernel) {
   }
   EXPECT_GT(bounded, count / 2);
   EXPECT_GT(jobs, count * 50);
+}
+
+// Jobs that are started and do not run yet have their groups, and run as soon as a more urgent job waits for one.
+TEST(RobotUnionBounds, HoldWithGroupsOnOneProcessor) {
+  std::uint64_t bounded = 0;
+  const std::uint64_t count = testing::how_many(1000);
+  for (std::uint64_t seed = 1; seed <= count; ++seed) {
+    Rng rng(seed);
+    const Robot robot = random_robot(rng, {0}, 0.5, 1);
+    const auto [plan, report] = analysed(robot, 90);
+    bounded += std::any_of(report.tasks.begin(), report.tasks.end(), [](const auto &each) { return each.response; });
+    for (std::uint64_t run = 0; run < 3; ++run) {
+      ASSERT_EQ(observe(robot, plan, report, 1, seed * 1000 + run).violation, "") << "seed " << seed << ", run " << run;
+    }
+  }
+  EXPECT_GT(bounded, count / 2);
+}
+
+// While the other process's job of 7 ticks waits, two jobs of the log run for two jobs of the control.
+TEST(RobotUnionBounds, CountEachHolderThatRunsForAMoreUrgentJob) {
+  using testing::tick_dag;
+  const auto process = [](const char *name, std::vector<Dag> dags) {
+    Process one;
+    one.name = name;
+    one.workload = testing::make_workload(std::move(dags), 1, PreemptionMode::Os);
+    return one;
+  };
+  Robot robot;
+  robot.cpu_sets = {CpuSet{"", {0}}};
+  robot.processes.push_back(
+      process("base", {tick_dag("log", {{.name = "a", .period = 22, .wcet = 2, .group = "bus"},
+                                        {.name = "b", .period = 22, .wcet = 2, .group = "bus"}}),
+                       tick_dag("control", {{.name = "c", .period = 8, .wcet = 1, .group = "bus"}})}));
+  robot.processes.push_back(process("camera", {tick_dag("images", {{.name = "d", .period = 17, .wcet = 7}})}));
+  const analysis::Tightest bound = analysed(robot, 90).report.tasks.back();
+  ASSERT_TRUE(bound.response);
+  EXPECT_GE(*bound.response, 12);
 }
 
 // An order in which rates of one process can come before shorter ones of another.

@@ -72,8 +72,8 @@ inline bool needs_wait_set(const rclcpp::Waitable &waitable) {
 #endif
 }
 
-/// The middleware's part of a QoS event, if its hook has to be set below rclcpp. Humble's QoS events call their on-ready
-/// hook with too few arguments for events before it was set. Null for all other waitables.
+/// The middleware's part of a QoS event, if its hook has to be set below rclcpp. Humble's QoS events call their
+/// on-ready hook with too few arguments for events before it was set. Null for all other waitables.
 inline std::shared_ptr<rcl_event_t> event_to_hook(const rclcpp::Waitable::SharedPtr &waitable) {
 #if RCLCPP_VERSION_MAJOR < 21
   struct Opened : rclcpp::QOSEventHandlerBase {
