@@ -35,7 +35,7 @@ constexpr Duration kTick = 1000;
 class SimulatedProcess {
  public:
   struct Job {
-    TaskId task;
+    TaskId task = {};
     Time release = 0;
     Time origin = 0;  // the release behind its data, in whatever process
     Duration left = 0;
