@@ -389,13 +389,14 @@ TEST(RobotUnionBounds, CountEachHolderThatRunsForAMoreUrgentJob) {
   Robot robot;
   robot.cpu_sets = {CpuSet{"", {0}}};
   robot.processes.push_back(
-      process("base", {tick_dag("log", {{.name = "a", .period = 22, .wcet = 2, .group = "bus"},
-                                        {.name = "b", .period = 22, .wcet = 2, .group = "bus"}}),
-                       tick_dag("control", {{.name = "c", .period = 8, .wcet = 1, .group = "bus"}})}));
-  robot.processes.push_back(process("camera", {tick_dag("images", {{.name = "d", .period = 17, .wcet = 7}})}));
+      process("base", {tick_dag("log", {{.name = "a", .period = 22 * kTick, .wcet = 2 * kTick, .group = "bus"},
+                                        {.name = "b", .period = 22 * kTick, .wcet = 2 * kTick, .group = "bus"}}),
+                       tick_dag("control", {{.name = "c", .period = 8 * kTick, .wcet = kTick, .group = "bus"}})}));
+  robot.processes.push_back(
+      process("camera", {tick_dag("images", {{.name = "d", .period = 17 * kTick, .wcet = 7 * kTick}})}));
   const analysis::Tightest bound = analysed(robot, 90).report.tasks.back();
   ASSERT_TRUE(bound.response);
-  EXPECT_GE(*bound.response, 12);
+  EXPECT_GE(*bound.response, 12 * kTick);
 }
 
 // An order in which rates of one process can come before shorter ones of another.

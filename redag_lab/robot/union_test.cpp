@@ -139,6 +139,8 @@ RC_GTEST_PROP(RobotUnion, IsTheWorkloadWrittenByHand, ()) {
     }
     robot.processes.push_back(std::move(process));
   }
+  // What no hand can write: more than one executor starts the jobs, or one with more threads than processors.
+  by_hand.platform.several_executors = count > 1 || robot.processes[0].workload->platform.workers > 2;
   const Result<LoadedWorkload> united = union_of(robot, kLevels);
   RC_ASSERT(united.has_value());
   RC_ASSERT(united->workload == by_hand);
