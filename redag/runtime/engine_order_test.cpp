@@ -279,7 +279,7 @@ TEST_F(EngineOrder, AShortJobKeepsNoHigherPriority) {
   ASSERT_TRUE(engine.start());
   engine.set_origin(monotonic_now());
   for (int i = 0; i < 40; ++i) {
-    const std::size_t task = static_cast<std::size_t>(i % 2);
+    const auto task = static_cast<std::size_t>(i % 2);
     engine.release(TaskId(task), engine.now());
     while (ends.load(std::memory_order_acquire) <= i) std::this_thread::yield();
     EXPECT_EQ(seen, top_ - static_cast<int>(task)) << i;
