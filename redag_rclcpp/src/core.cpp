@@ -475,11 +475,15 @@ void ReDAGExecutor::Core::stop_workers() {
 
 void ReDAGExecutor::Core::spin_ready(nanoseconds max_duration, bool exhaustive) {
   const redag::Time end = max_duration.count() == 0 ? kNever : engine_->now() + max_duration.count();
+  bool first = true;  // it runs also if the time is over: collecting entities can take longer
   bool again = true;
   while (again) {
     admit(true);
     again = false;
-    while (hooks_.may_spin() && engine_->now() < end && run_one()) again = exhaustive;
+    while (hooks_.may_spin() && (first || engine_->now() < end) && run_one()) {
+      first = false;
+      again = exhaustive;
+    }
   }
 }
 
