@@ -46,8 +46,7 @@ geometry_msgs::msg::PoseStamped pose_of(std::size_t place) {
 }
 
 /// How far each interval is from the period of `rate` Hz.
-template <class Intervals>
-Samples deviations(const Intervals &intervals, double rate) {
+Samples deviations(const std::vector<std::int64_t> &intervals, double rate) {
   Samples off;
   const auto period = static_cast<double>(redag::kSecond) / rate;
   for (const std::int64_t interval : intervals) off.add(std::llround(std::abs(static_cast<double>(interval) - period)));
@@ -170,14 +169,18 @@ void NavigationUser::navigate(std::size_t place, Time end) {
   Navigate::Goal goal;
   goal.pose = pose_of(place);
   rclcpp_action::Client<Navigate>::SendGoalOptions options;
-  std::optional<std::int64_t> last;
-  int recoveries = 0;
+  struct Progress {
+    std::optional<std::int64_t> last_tick;
+    int recoveries = 0;
+  };
+  const auto progress = std::make_shared<Progress>();  // a goal that is accepted too late can outlive this call
   // Each tick of the tree tells the time since the goal was accepted.
-  options.feedback_callback = [&](const auto &, const std::shared_ptr<const Navigate::Feedback> &feedback) {
+  options.feedback_callback = [this, progress](const auto &,
+                                               const std::shared_ptr<const Navigate::Feedback> &feedback) {
     const std::int64_t tick = rclcpp::Duration(feedback->navigation_time).nanoseconds();
-    if (last && monotonic_now() >= begin_) tick_intervals_.push_back(tick - *last);
-    last = tick;
-    recoveries = feedback->number_of_recoveries;
+    if (progress->last_tick && monotonic_now() >= begin_) tick_intervals_.push_back(tick - *progress->last_tick);
+    progress->last_tick = tick;
+    progress->recoveries = feedback->number_of_recoveries;
   };
   const auto handle = send(*navigator_, goal, options);
   if (!handle) {
@@ -195,9 +198,8 @@ void NavigationUser::navigate(std::size_t place, Time end) {
     navigator_->async_cancel_goal(handle);
     await(result);
   }
-  // The callback refers to this call.
   navigator_->stop_callbacks(handle);
-  if (monotonic_now() >= begin_) recoveries_ += recoveries;
+  if (monotonic_now() >= begin_) recoveries_ += progress->recoveries;
 }
 
 void NavigationUser::follow_plans(std::size_t place, Time end) {
