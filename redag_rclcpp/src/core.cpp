@@ -301,7 +301,7 @@ void ReDAGExecutor::Core::report(const RaisedMiddleware &middleware, bool due) {
                {.rmw = rmw == nullptr || rmw->implementation_identifier == nullptr ? "the middleware"
                                                                                    : rmw->implementation_identifier,
                 .wanted = middleware.priority(),
-                .top_job = setup_.band.top_job,
+                .top_job = setup_.top_job_priority(),
                 .timer = setup_.timer_priority()});
   if (report.summary != middleware_summary_) RCLCPP_INFO(logger(), "%s", report.summary.c_str());
   middleware_summary_ = report.summary;
