@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "action_type.hpp"
+#include "action_names.hpp"
 #include "callback.hpp"
 #include "rclcpp/logging.hpp"
 #include "redag/base/lock_guard.hpp"

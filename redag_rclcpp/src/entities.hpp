@@ -7,10 +7,12 @@
 
 #include <functional>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "callback.hpp"
 #include "rclcpp/callback_group.hpp"
+#include "rclcpp/context.hpp"
 
 namespace redag_rclcpp {
 
@@ -19,6 +21,8 @@ struct Entity {
   const void *part = nullptr;   // a waitable of the group that belongs to this entity, if any
   const void *owner = nullptr;  // the waitable whose timer this is, if any
   redag::CallbackId id;         // without node; entities without a name still need their index
+  /// The name, if finding it takes so long that only a new callback is asked.
+  std::function<std::string(rclcpp::Context &context)> name_of{};
   rclcpp::CallbackGroup::SharedPtr group{};
   bool in_default_group = false;
   /// Makes the callback. Holds the entity.

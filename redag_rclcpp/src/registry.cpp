@@ -228,6 +228,7 @@ void Registry::watch_group(rclcpp::CallbackGroup &group, const std::function<voi
 void Registry::add(const Entity &found) {
   TaskTable::Entry entry;
   entry.id = found.id;
+  if (found.name_of) entry.id.name = found.name_of(*context_);
   // The timers of waitables are numbered on their own. Otherwise the numbers that a workload states would depend on the
   // distribution.
   const int kind = found.owner == nullptr ? static_cast<int>(entry.id.kind) : -1;

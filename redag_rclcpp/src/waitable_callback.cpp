@@ -5,10 +5,12 @@
 #include <rcl/event_callback.h>
 
 #include <atomic>
+#include <functional>
 #include <memory>
+#include <string>
 #include <utility>
 
-#include "action_type.hpp"
+#include "action_names.hpp"
 #include "arrival_callback.hpp"
 #include "compat.hpp"
 #include "entities.hpp"
@@ -18,10 +20,15 @@
 namespace redag_rclcpp {
 namespace {
 
+Exchange::Side side_of(const rclcpp::Waitable &waitable) {
+  if (dynamic_cast<const rclcpp_action::ClientBase *>(&waitable) != nullptr) return Exchange::Side::Client;
+  if (dynamic_cast<const rclcpp_action::ServerBase *>(&waitable) != nullptr) return Exchange::Side::Server;
+  return Exchange::Side::None;
+}
+
 Exchange exchange_of(const rclcpp::Waitable &waitable) {
   Exchange exchange;
-  if (dynamic_cast<const rclcpp_action::ClientBase *>(&waitable) != nullptr) exchange.side = Exchange::Side::Client;
-  if (dynamic_cast<const rclcpp_action::ServerBase *>(&waitable) != nullptr) exchange.side = Exchange::Side::Server;
+  exchange.side = side_of(waitable);
   exchange.is_action = exchange.side != Exchange::Side::None;
   if (exchange.is_action) exchange.name = action_type_of(waitable);
   return exchange;
@@ -143,8 +150,13 @@ class WaitableCallback final : public ArrivalCallback, public ActionClientCallba
 }  // namespace
 
 Entity entity_of(const rclcpp::Waitable::SharedPtr &waitable) {
+  const bool is_action = side_of(*waitable) != Exchange::Side::None;
   return {.key = waitable.get(),
-          .id = {.kind = redag::Callback::Kind::Waitable, .node = {}, .name = {}},
+          .id = {.kind = is_action ? redag::Callback::Kind::Action : redag::Callback::Kind::Waitable,
+                 .node = {},
+                 .name = {}},
+          .name_of = is_action ? [waitable](rclcpp::Context &context) { return action_name_of(*waitable, context); }
+                               : std::function<std::string(rclcpp::Context &)>(),
           .make = [waitable](std::shared_ptr<ExecutorContext> context, redag::CallbackId id) {
             return std::make_shared<WaitableCallback>(std::move(context), std::move(id), waitable);
           }};

@@ -34,6 +34,7 @@ using redag::Coroutine;
 using test_msgs::action::Fibonacci;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::UnorderedElementsAre;
 using ActionClient = rclcpp_action::Client<Fibonacci>;
 using GoalHandle = rclcpp_action::ClientGoalHandle<Fibonacci>;
 using ServerGoal = rclcpp_action::ServerGoalHandle<Fibonacci>;
@@ -153,6 +154,36 @@ INSTANTIATE_TEST_SUITE_P(Modes, ActionCoroutineTest,
                          ::testing::Values(redag::PreemptionMode::None, redag::PreemptionMode::Cooperative,
                                            redag::PreemptionMode::Os),
                          [](const auto &test) { return std::string(to_string(test.param)); });
+
+TEST_P(ActionCoroutineTest, TasksOfActionsAreFoundByTheirNames) {
+  options.workload = parse(R"(
+name: test
+platform: {workers: 1}
+dags:
+  - name: served
+    tasks: [{name: server, period: 30ms, callback: {node: /server, action: /fibonacci}}]
+  - name: called
+    tasks: [{name: clients, period: 40ms, callback: {node: /node, action: "/fib*"}}]
+)");
+  const auto other = create_client(nullptr, "other");
+  std::atomic<bool> done{false};
+  once([&]() -> Coroutine {
+    EXPECT_TRUE(co_await send_goal(client, order(7)));
+    done = true;
+  });
+  ReDAGExecutor executor(options);
+  executor.add_node(node);
+  executor.add_node(server->node);
+  const Spinner<ReDAGExecutor> spinner(executor);
+  EXPECT_TRUE(eventually([&] { return done.load(); }));
+  std::vector<std::string> actions;
+  for (const CallbackStats &callback : executor.stats()) {
+    if (callback.id.kind == redag::Callback::Kind::Action)
+      actions.push_back(to_string(callback.id) + ": " + callback.dag);
+  }
+  EXPECT_THAT(actions, UnorderedElementsAre("/server action /fibonacci: served", "/node action /fibonacci: called",
+                                            "/node action /other: "));
+}
 
 TEST_P(ActionCoroutineTest, AGoalSucceedsAndItsFeedbackComesDuringTheWait) {
   server->ends = false;

@@ -307,8 +307,8 @@ TEST_P(DeadlockTest, AnActionClientInTheGroupOfTheCallbackThatWaits) {
   const std::vector<Deadlock> found = wait_for_deadlocks();
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].waiting, "/node timer 10 ms (0)");
-  EXPECT_THAT(found[0].blocked,
-              AllOf(HasSubstr("/node waitable ("), HasSubstr("(action client of test_msgs::action::Fibonacci)")));
+  EXPECT_THAT(found[0].blocked, AllOf(HasSubstr("/node action /fibonacci"),
+                                      HasSubstr("(action client of test_msgs::action::Fibonacci)")));
   EXPECT_EQ(found[0].resource, "the default callback group of /node");
   EXPECT_THAT(found[0].text, HasSubstr("SendGoalOptions"));
   expect_end();

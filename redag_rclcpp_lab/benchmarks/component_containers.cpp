@@ -3,10 +3,14 @@
 
 #include "component_containers.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <ament_index_cpp/get_package_prefix.hpp>
+#include <ament_index_cpp/get_package_share_directory.hpp>
 #include <chrono>
 #include <fstream>
+#include <memory>
 #include <stdexcept>
 #include <thread>
 #include <utility>
@@ -23,6 +27,14 @@ using composition_interfaces::srv::LoadNode;
 
 constexpr std::chrono::seconds kLimit(30);  // of a container's answer
 constexpr const char *kOwnContainer = "--container";
+constexpr const char *kControlReport = "control";  // in the folder of a run
+
+constexpr const char *kExplanation =
+    R"(Containers: single, mt, isolated (rclcpp's component_container,
+component_container_mt and component_container_isolated), events, cbg (rclcpp's
+container on these executors), redag-none, redag-coop, redag-os (redag_rclcpp's
+component_container). Prefix the command with `chrt -f 10` to give all threads
+of all containers a real-time priority; redag-os sets those of its own.)";
 
 double now_in_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
@@ -89,10 +101,19 @@ int run_container(const std::string &executor_name, int argc, char **argv) {
 
 }  // namespace
 
-std::vector<std::string> container_names() {
-  std::vector<std::string> names;
-  for (const auto &[name, command] : commands("none")) names.push_back(name);
-  return names;
+Component control_loop(const StackRun &run, double rate, double warm_up, double seconds) {
+  return {"redag_rclcpp_lab",
+          "redag_rclcpp::lab::Control",
+          {},
+          {rclcpp::Parameter("period", 1 / rate), rclcpp::Parameter("warm_up", warm_up),
+           rclcpp::Parameter("seconds", seconds), rclcpp::Parameter("report", run.folder + "/" + kControlReport)}};
+}
+
+void add_control(Figures &figures, const StackRun &run) {
+  const nlohmann::json control = read_report(run.folder + "/" + kControlReport);
+  figures["control missed, %"] =
+      100 * control.at("missed").get<double>() / std::max(1.0, control.at("points").get<double>());
+  for (const auto &[rank, value] : control.at("lateness").items()) figures["control late, ms, " + rank] = value;
 }
 
 Container::Container(const StackRun &run, const StackOptions &options, const std::string &parameters)
@@ -116,9 +137,16 @@ nlohmann::json read_report(const std::string &file) {
   return nlohmann::json::parse(in);
 }
 
-std::optional<int> run_own_container(int argc, char **argv) {
-  if (argc < 3 || std::string(argv[1]) != kOwnContainer) return std::nullopt;
-  return run_container(argv[2], argc, argv);
+int run_containers(StackComparison comparison, int argc, char **argv) {
+  if (argc >= 3 && std::string(argv[1]) == kOwnContainer) return run_container(argv[2], argc, argv);
+  rclcpp::init(0, nullptr);
+  comparison.explanation = fmt::format("{}\n\n{}", kExplanation, comparison.explanation);
+  comparison.config =
+      ament_index_cpp::get_package_share_directory("redag_rclcpp") + "/config/stacks/" + comparison.config;
+  for (const auto &[name, command] : commands("none")) comparison.contenders.push_back(name);
+  const int status = run_comparison(comparison, argc, argv);
+  rclcpp::shutdown();
+  return status;
 }
 
 }  // namespace redag_rclcpp::lab

@@ -5,9 +5,7 @@
 // in each preemption mode.
 #pragma once
 
-#include <memory>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,17 +15,6 @@
 
 namespace redag_rclcpp::lab {
 
-/// The containers that this build and this process can start, by their names as contenders.
-[[nodiscard]] std::vector<std::string> container_names();
-
-/// What the names mean, for --help.
-inline constexpr const char *kContainersExplained =
-    R"(Containers: single, mt, isolated (rclcpp's component_container,
-component_container_mt and component_container_isolated), events, cbg (rclcpp's
-container on these executors), redag-none, redag-coop, redag-os (redag_rclcpp's
-component_container). Prefix the command with `chrt -f 10` to give all threads
-of all containers a real-time priority; redag-os sets those of its own.)";
-
 /// A component to load.
 struct Component {
   std::string package;
@@ -36,11 +23,18 @@ struct Component {
   std::vector<rclcpp::Parameter> parameters{};
 };
 
+/// The control loop that runs beside each stack: `rate` calls a second, each of which uses the processor for 0.3 ms. It
+/// measures for `seconds` after the first `warm_up` seconds; 0: to its end.
+[[nodiscard]] Component control_loop(const StackRun &run, double rate, double warm_up, double seconds = 0);
+
+/// Adds what the run's control loop measured: how late it was called, and points of its grid that it missed. The
+/// container has ended. Throws std::runtime_error.
+void add_control(Figures &figures, const StackRun &run);
+
 /// A container's process. The destructor kills it if it still runs.
 class Container {
  public:
-  /// Starts the run's contender, one of container_names(). `parameters`: a parameter file for all nodes, or empty.
-  /// Throws std::runtime_error.
+  /// Starts the run's contender. `parameters`: a parameter file for all nodes, or empty. Throws std::runtime_error.
   Container(const StackRun &run, const StackOptions &options, const std::string &parameters = "");
 
   /// Loads components, one by one. Throws std::runtime_error if the container refuses one or does not answer.
@@ -58,8 +52,9 @@ class Container {
 /// Reads what a component wrote as it was destroyed. Throws std::runtime_error.
 [[nodiscard]] nlohmann::json read_report(const std::string &file);
 
-/// To be called first in main(). Some containers are this program, started anew: then it runs to the container's end.
-/// Returns the exit status in this case.
-[[nodiscard]] std::optional<int> run_own_container(int argc, char **argv);
+/// The main function of a comparison of component containers. Adds what all of them share: the contenders, what their
+/// names mean, and the folder of `config`, a file of redag_rclcpp's config/stacks. Some containers are this program,
+/// started anew: then it runs to the container's end.
+int run_containers(StackComparison comparison, int argc, char **argv);
 
 }  // namespace redag_rclcpp::lab

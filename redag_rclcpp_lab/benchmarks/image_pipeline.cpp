@@ -5,15 +5,11 @@
 // redag_rclcpp's. A synthetic camera feeds them, and a control loop of 500 Hz runs beside them in the same process.
 // Measures how late the control loop is called, the latency from the camera to the last image, frames that are lost,
 // and processor time. Containers take turns. Built if the package image_proc is present.
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <ament_index_cpp/get_package_share_directory.hpp>
 #include <chrono>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "command_line.hpp"
@@ -52,11 +48,9 @@ struct Rates {
 };
 
 /// In the order in which they are loaded: image_proc's nodes take the quality of service of the publishers they find.
-std::vector<Component> components(const Rates &rates, const std::string &folder) {
+std::vector<Component> components(const Rates &rates, const StackRun &run) {
   const std::string own = "redag_rclcpp_lab";
   const rclcpp::Parameter frame_period("period", 1 / rates.images);
-  const rclcpp::Parameter warm_up("warm_up", kWarmUp);
-  const auto report = [&](const char *name) { return rclcpp::Parameter("report", folder + "/" + name); };
   return {
       {own,
        "redag_rclcpp::lab::Camera",
@@ -68,27 +62,24 @@ std::vector<Component> components(const Rates &rates, const std::string &folder)
        "image_proc::ResizeNode",
        {"image/image_raw:=image_rect", "image/camera_info:=camera_info"},
        {rclcpp::Parameter("scale_width", 0.5), rclcpp::Parameter("scale_height", 0.5)}},
-      {own, "redag_rclcpp::lab::Viewer", {"image:=resize/image_raw"}, {frame_period, warm_up, report("viewer")}},
       {own,
-       "redag_rclcpp::lab::Control",
-       {},
-       {rclcpp::Parameter("period", 1 / rates.control), warm_up, report("control")}},
+       "redag_rclcpp::lab::Viewer",
+       {"image:=resize/image_raw"},
+       {frame_period, rclcpp::Parameter("warm_up", kWarmUp), rclcpp::Parameter("report", run.folder + "/viewer")}},
+      redag_rclcpp::lab::control_loop(run, rates.control, kWarmUp),
   };
 }
 
 Figures measure(const StackRun &run, const StackOptions &options, const Rates &rates) {
   Container container(run, options);
-  container.load(components(rates, run.folder));
+  container.load(components(rates, run));
   std::this_thread::sleep_for(Seconds(kWarmUp + options.seconds));
   const double used = container.end();
-  const nlohmann::json control = read_report(run.folder + "/control");
   const nlohmann::json viewer = read_report(run.folder + "/viewer");
-  Figures figures = {{"control missed, %",
-                      100 * control.at("missed").get<double>() / std::max(1.0, control.at("points").get<double>())},
-                     {"frames shown", viewer.at("frames").get<double>()},
+  Figures figures = {{"frames shown", viewer.at("frames").get<double>()},
                      {"frames lost", viewer.at("lost").get<double>()},
                      {"processors used", used}};
-  for (const auto &[rank, value] : control.at("lateness").items()) figures["control late, ms, " + rank] = value;
+  add_control(figures, run);
   for (const auto &[rank, value] : viewer.at("latency").items()) figures["image latency, ms, " + rank] = value;
   return figures;
 }
@@ -96,15 +87,12 @@ Figures measure(const StackRun &run, const StackOptions &options, const Rates &r
 }  // namespace
 
 int main(int argc, char **argv) {
-  if (const std::optional<int> status = redag_rclcpp::lab::run_own_container(argc, argv)) return *status;
-  rclcpp::init(0, nullptr);
   Rates rates;
   redag_rclcpp::lab::StackComparison comparison;
   comparison.program = "bench_image_pipeline";
   comparison.description = kDescription;
-  comparison.explanation = fmt::format("{}\n\n{}", redag_rclcpp::lab::kContainersExplained, kExplanation);
-  comparison.config =
-      ament_index_cpp::get_package_share_directory("redag_rclcpp") + "/config/stacks/image_pipeline.yaml";
+  comparison.explanation = kExplanation;
+  comparison.config = "image_pipeline.yaml";
   comparison.add_options = [&](CLI::App &app) {
     using redag_rclcpp::lab::add_number;
     add_number<int>(app, "--width", rates.width, 1, "Size of the camera's images");
@@ -112,9 +100,6 @@ int main(int argc, char **argv) {
     add_number<double>(app, "--rate", rates.images, 0.001, "Images a second");
     add_number<double>(app, "--control", rates.control, 0.001, "Calls of the control loop a second, of 0.3 ms each");
   };
-  comparison.contenders = redag_rclcpp::lab::container_names();
   comparison.measure = [&](const StackRun &run, const StackOptions &options) { return measure(run, options, rates); };
-  const int status = run_comparison(comparison, argc, argv);
-  rclcpp::shutdown();
-  return status;
+  return redag_rclcpp::lab::run_containers(std::move(comparison), argc, argv);
 }

@@ -60,10 +60,11 @@ TransformStamped fixed_transform(const std::string &parent, const std::string &c
 
 }  // namespace
 
-/// Drives as the last message on `cmd_vel` says, for at most `patience` seconds. Publishes `odom` and the transform to
-/// `base_link` every `period` seconds. The report is {"commands": [[stamp, arrival, moves], ...], "poses": [[stamp,
-/// arrival], ...]} with times in nanoseconds of the node's clock. "poses" are those that commands were computed from:
-/// the controller tells them on `lookahead_point`, just before each command.
+/// Drives as the last message on `cmd_vel` or `behavior_vel` says, for at most `patience` seconds. Publishes `odom` and
+/// the transform to `base_link` every `period` seconds. The report is {"commands": [[stamp, arrival, moves], ...],
+/// "behavior_commands": as before, "poses": [[stamp, arrival], ...]} with times in nanoseconds of the node's clock.
+/// "poses" are those that commands were computed from: the controller tells them on `lookahead_point`, just before each
+/// command.
 class Base : public rclcpp::Node {
  public:
   explicit Base(const rclcpp::NodeOptions &options)
@@ -76,7 +77,9 @@ class Base : public rclcpp::Node {
         fixed_frames_(*this),
         odometry_(create_publisher<Odometry>("odom", 10)),
         commands_subscription_(create_subscription<TwistStamped>(
-            "cmd_vel", 1, [this](TwistStamped::ConstSharedPtr command) { take(*command); })),
+            "cmd_vel", 1, [this](TwistStamped::ConstSharedPtr command) { take(*command, commands_); })),
+        behavior_commands_subscription_(create_subscription<TwistStamped>(
+            "behavior_vel", 1, [this](TwistStamped::ConstSharedPtr command) { take(*command, behavior_commands_); })),
         poses_subscription_(create_subscription<PointStamped>(
             "lookahead_point", 1,
             [this](PointStamped::ConstSharedPtr point) {
@@ -91,9 +94,14 @@ class Base : public rclcpp::Node {
 
   ~Base() override {
     if (report_.empty()) return;
-    nlohmann::json commands = nlohmann::json::array();
-    for (const Command &command : commands_) commands.push_back({command.stamp, command.arrival, command.moves});
-    write_report(*this, report_, {{"commands", commands}, {"poses", poses_}});
+    const auto listed = [](const std::vector<Command> &commands) {
+      nlohmann::json list = nlohmann::json::array();
+      for (const Command &command : commands) list.push_back({command.stamp, command.arrival, command.moves});
+      return list;
+    };
+    write_report(
+        *this, report_,
+        {{"commands", listed(commands_)}, {"behavior_commands", listed(behavior_commands_)}, {"poses", poses_}});
   }
 
  private:
@@ -103,12 +111,12 @@ class Base : public rclcpp::Node {
     bool moves;
   };
 
-  void take(const TwistStamped &command) {
+  void take(const TwistStamped &command, std::vector<Command> &commands) {
     move();
     forward_ = command.twist.linear.x;
     turn_ = command.twist.angular.z;
     commanded_ = moved_;
-    commands_.push_back(
+    commands.push_back(
         {rclcpp::Time(command.header.stamp).nanoseconds(), moved_.nanoseconds(), forward_ != 0 || turn_ != 0});
   }
 
@@ -151,11 +159,13 @@ class Base : public rclcpp::Node {
   rclcpp::Time moved_;
   rclcpp::Time commanded_ = moved_;
   std::vector<Command> commands_;
+  std::vector<Command> behavior_commands_;
   std::vector<std::pair<std::int64_t, std::int64_t>> poses_;
   tf2_ros::TransformBroadcaster frames_;
   tf2_ros::StaticTransformBroadcaster fixed_frames_;
   rclcpp::Publisher<Odometry>::SharedPtr odometry_;
   rclcpp::Subscription<TwistStamped>::SharedPtr commands_subscription_;
+  rclcpp::Subscription<TwistStamped>::SharedPtr behavior_commands_subscription_;
   rclcpp::Subscription<PointStamped>::SharedPtr poses_subscription_;
   rclcpp::TimerBase::SharedPtr timer_;
 };

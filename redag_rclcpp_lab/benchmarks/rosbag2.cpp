@@ -7,8 +7,6 @@
 // if rosbag2_transport is present, since Jazzy, whose rosbag2 has components.
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <ament_index_cpp/get_package_share_directory.hpp>
 #include <chrono>
 #include <filesystem>
 #include <map>
@@ -18,6 +16,7 @@
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "bag_recording.hpp"
@@ -84,9 +83,8 @@ void write_replayed(const std::string &folder, double seconds) {
   }
 }
 
-std::vector<Component> components(const Setting &setting, const std::string &folder) {
+std::vector<Component> components(const Setting &setting, const StackRun &run) {
   const std::string own = "redag_rclcpp_lab";
-  const rclcpp::Parameter warm_up("warm_up", kWarmUp);
   std::vector<std::string> topics = {"/camera"};
   for (int i = 0; i < setting.units; ++i) topics.push_back(fmt::format("/imu_{}", i));
   std::vector<Component> all = {
@@ -99,23 +97,20 @@ std::vector<Component> components(const Setting &setting, const std::string &fol
       {"rosbag2_transport",
        "rosbag2_transport::Recorder",
        {},
-       {rclcpp::Parameter("storage.uri", folder + "/recorded"),
+       {rclcpp::Parameter("storage.uri", run.folder + "/recorded"),
         rclcpp::Parameter("storage.storage_id", setting.storage), rclcpp::Parameter("record.topics", topics),
         rclcpp::Parameter("record.disable_keyboard_controls", true)}},
-      {own,
-       "redag_rclcpp::lab::Control",
-       {},
-       {rclcpp::Parameter("period", 1 / setting.control), warm_up, rclcpp::Parameter("report", folder + "/control")}}};
+      redag_rclcpp::lab::control_loop(run, setting.control, kWarmUp)};
   if (setting.play) {
-    all.push_back(
-        {own,
-         "redag_rclcpp::lab::Listener",
-         {},
-         {rclcpp::Parameter("period", 1 / kReplayedRate), warm_up, rclcpp::Parameter("report", folder + "/listener")}});
+    all.push_back({own,
+                   "redag_rclcpp::lab::Listener",
+                   {},
+                   {rclcpp::Parameter("period", 1 / kReplayedRate), rclcpp::Parameter("warm_up", kWarmUp),
+                    rclcpp::Parameter("report", run.folder + "/listener")}});
     all.push_back({"rosbag2_transport",
                    "rosbag2_transport::Player",
                    {},
-                   {rclcpp::Parameter("storage.uri", folder + "/replayed"),
+                   {rclcpp::Parameter("storage.uri", run.folder + "/replayed"),
                     rclcpp::Parameter("play.disable_keyboard_controls", true)}});
   }
   return all;
@@ -156,15 +151,12 @@ Figures count_recorded(const std::string &folder) {
 Figures measure(const StackRun &run, const StackOptions &options, const Setting &setting) {
   if (setting.play) write_replayed(run.folder + "/replayed", options.seconds);
   Container container(run, options);
-  container.load(components(setting, run.folder));
+  container.load(components(setting, run));
   std::this_thread::sleep_for(Seconds(kWarmUp + options.seconds));
   const double used = container.end();
   Figures figures = count_recorded(run.folder + "/recorded");
   std::filesystem::remove_all(run.folder + "/recorded");
-  const nlohmann::json control = read_report(run.folder + "/control");
-  figures["control missed, %"] =
-      100 * control.at("missed").get<double>() / std::max(1.0, control.at("points").get<double>());
-  for (const auto &[rank, value] : control.at("lateness").items()) figures["control late, ms, " + rank] = value;
+  add_control(figures, run);
   figures["processors used"] = used;
   if (setting.play) {
     const nlohmann::json listener = read_report(run.folder + "/listener");
@@ -178,14 +170,12 @@ Figures measure(const StackRun &run, const StackOptions &options, const Setting 
 }  // namespace
 
 int main(int argc, char **argv) {
-  if (const std::optional<int> status = redag_rclcpp::lab::run_own_container(argc, argv)) return *status;
-  rclcpp::init(0, nullptr);
   Setting setting;
   redag_rclcpp::lab::StackComparison comparison;
   comparison.program = "bench_rosbag2";
   comparison.description = kDescription;
-  comparison.explanation = fmt::format("{}\n\n{}", redag_rclcpp::lab::kContainersExplained, kExplanation);
-  comparison.config = ament_index_cpp::get_package_share_directory("redag_rclcpp") + "/config/stacks/rosbag2.yaml";
+  comparison.explanation = kExplanation;
+  comparison.config = "rosbag2.yaml";
   comparison.add_options = [&](CLI::App &app) {
     using redag_rclcpp::lab::add_number;
     add_number<int>(app, "--width", setting.width, 1, "Size of the camera's images");
@@ -197,9 +187,6 @@ int main(int argc, char **argv) {
     app.add_option("--storage", setting.storage, "Storage plugin of the Recorder")->capture_default_str();
     app.add_flag("!--no-play", setting.play, "Without the Player and its listener");
   };
-  comparison.contenders = redag_rclcpp::lab::container_names();
   comparison.measure = [&](const StackRun &run, const StackOptions &options) { return measure(run, options, setting); };
-  const int status = run_comparison(comparison, argc, argv);
-  rclcpp::shutdown();
-  return status;
+  return redag_rclcpp::lab::run_containers(std::move(comparison), argc, argv);
 }

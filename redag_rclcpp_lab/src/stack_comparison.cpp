@@ -6,6 +6,8 @@
 #include <fmt/format.h>
 #include <stdlib.h>
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdio>
 #include <filesystem>
 #include <optional>
@@ -19,10 +21,12 @@ namespace {
 using Results = std::map<std::string, std::map<std::string, std::vector<double>>>;  // by figure, then by contender
 
 void print_medians(const Results &results, const std::vector<std::string> &contenders) {
-  fmt::print("{:28}", "medians");
+  std::size_t width = 28;
+  for (const auto &[figure, by_contender] : results) width = std::max(width, figure.size() + 1);
+  fmt::print("{:{}}", "medians", width);
   for (const std::string &contender : contenders) fmt::print("{:>12}", contender);
   for (const auto &[figure, by_contender] : results) {
-    fmt::print("\n{:28}", figure);
+    fmt::print("\n{:{}}", figure, width);
     for (const std::string &contender : contenders) {
       const auto values = by_contender.find(contender);
       if (values == by_contender.end()) {
