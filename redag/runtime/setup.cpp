@@ -120,6 +120,11 @@ int Setup::timer_priority() const {
   return fifo_priority_above_this_thread();
 }
 
+int Setup::top_job_priority() const {
+  if (mode.mode == PreemptionMode::Os) return band.top_job;
+  return std::max(0, timer_priority() - 1);
+}
+
 Result<Setup> set_up(const SetupRequest &request) {
   Setup setup;
   setup.band = probe_priority_band();

@@ -86,6 +86,8 @@ struct Setup {
   /// SCHED_FIFO priority of threads that must not wait for jobs, first of all the release timer; 0: none. Without `os`
   /// it is one above that of the calling thread, which workers inherit (`chrt -f 10 program`).
   [[nodiscard]] int timer_priority() const;
+  /// SCHED_FIFO priority of the most urgent jobs; 0: none. Without `os` it is that of the calling thread.
+  [[nodiscard]] int top_job_priority() const;
 };
 
 /// The options that an executor asks for.

@@ -239,9 +239,11 @@ TEST(Setup, TheTimerOutranksWorkersThatInheritAPriority) {
     const auto setup = set_up({.preemption = mode, .workers = 1});
     ASSERT_TRUE(setup);
     EXPECT_EQ(setup->timer_priority(), 0);
+    EXPECT_EQ(setup->top_job_priority(), 0);
     std::thread([&] {
       ASSERT_TRUE(set_fifo_priority(pthread_self(), 7));
       EXPECT_EQ(setup->timer_priority(), 8);
+      EXPECT_EQ(setup->top_job_priority(), 7);
     }).join();
   }
 }

@@ -6,6 +6,7 @@
 #include <rcl/client.h>
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <utility>
 
@@ -92,29 +93,28 @@ bool AwaitedCalls::is_sending() const {
 
 // A response of an unknown request may come before the number of the request is known.
 void AwaitedCalls::put(Response response) {
-  const redag::LockGuard guard(lock_);
-  if (Call *const call = give(response)) {
-    (void)uncount(1);
-    call->event_.set();
-  } else if (is_sending()) {
-    unknown_.push_back(std::move(response));
-  } else {
-    set_aside_.push_back(std::move(response));
-    set_aside_count_.store(set_aside_.size(), std::memory_order_release);
+  std::size_t count = 0;
+  {
+    const redag::LockGuard guard(lock_);
+    use_arrival();
+    if (Call *const call = give(response)) {
+      call->event_.set();
+    } else {
+      unknown_.push_back(std::move(response));
+      count = settle();
+    }
   }
+  leave_to_callback(count);
 }
 
-std::size_t AwaitedCalls::uncount(std::size_t most) {
-  const std::size_t count = std::min(most, arrived_);
-  arrived_ -= count;
-  return count;
-}
+// None is counted if the response was taken before its arrival was reported.
+void AwaitedCalls::use_arrival() { arrived_ -= std::min<std::size_t>(1, arrived_); }
 
-// Sorts the unknown responses once all numbers are known. Returns how many arrivals are for the client's callback.
+// Sorts the unknown responses once all numbers are known. Returns how many are for the client's callback.
 std::size_t AwaitedCalls::settle() {
   if (is_sending()) return 0;
-  const std::size_t count = uncount(unknown_.size());
-  for (Response &response : unknown_) set_aside_.push_back(std::move(response));
+  const std::size_t count = unknown_.size();
+  std::move(unknown_.begin(), unknown_.end(), std::back_inserter(set_aside_));
   unknown_.clear();
   set_aside_count_.store(set_aside_.size(), std::memory_order_release);
   return count;
@@ -149,7 +149,6 @@ bool AwaitedCalls::deliver(const Response &response) {
   }
   if (!is_sending()) return false;
   unknown_.push_back(response);
-  ++arrived_;  // its arrival has been used
   return true;
 }
 
@@ -172,7 +171,7 @@ AwaitedCalls::Call::~Call() {
     std::erase(calls_.calls_, this);
     calls_.awaited_.store(calls_.calls_.size(), std::memory_order_release);
     count = calls_.settle();
-    if (calls_.arrived_ > 0 && calls_.calls_.empty()) count += calls_.uncount(calls_.arrived_);
+    if (calls_.calls_.empty()) count += std::exchange(calls_.arrived_, 0);
     if (calls_.arrived_ > 0) calls_.wake_callers();
   }
   calls_.leave_to_callback(count);
@@ -192,7 +191,6 @@ void AwaitedCalls::Call::send(rclcpp::ClientBase &client, const void *request) {
     if (its != calls_.unknown_.end()) {
       response_ = its->message;
       calls_.unknown_.erase(its);
-      (void)calls_.uncount(1);
       event_.set();
     }
     count = calls_.settle();
@@ -200,11 +198,16 @@ void AwaitedCalls::Call::send(rclcpp::ClientBase &client, const void *request) {
   calls_.leave_to_callback(count);
 }
 
+// All clients of a service receive its responses. An attempt of rmw_fastrtps takes nothing if the first response is to
+// another client, and drops it; that of this call can be behind it. Each such attempt uses up an arrival.
 std::shared_ptr<void> AwaitedCalls::Call::take(rclcpp::ClientBase &client) {
+  const redag::LockGuard one_at_a_time(calls_.taking_);
   for (;;) {
+    std::size_t arrived = 0;
     {
       const redag::LockGuard guard(calls_.lock_);
       if (response_) return std::move(response_);
+      arrived = calls_.arrived_;
     }
     Response response{client.create_request_header(), client.create_response()};
     const bool taken = take_and_handle(
@@ -212,16 +215,10 @@ std::shared_ptr<void> AwaitedCalls::Call::take(rclcpp::ClientBase &client) {
         [&] { return client.take_type_erased_response(response.message.get(), *response.id); },
         [&] { calls_.put(std::move(response)); });
     if (taken) continue;
-    // All that has arrived and is still counted was set aside.
-    std::size_t count = 0;
-    {
-      const redag::LockGuard guard(calls_.lock_);
-      const std::size_t set_aside = std::min(calls_.set_aside_.size(), calls_.arrived_);
-      count = calls_.uncount(set_aside);
-      if (response_) return std::move(response_);
-    }
-    calls_.leave_to_callback(count);
-    return nullptr;
+    const redag::LockGuard guard(calls_.lock_);
+    if (response_) return std::move(response_);
+    if (arrived == 0) return nullptr;
+    calls_.use_arrival();
   }
 }
 

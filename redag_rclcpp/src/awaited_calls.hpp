@@ -5,9 +5,9 @@
 // themselves. They need no callback group for that: a job that waits holds its own. Responses of other calls that they
 // take are set aside for the client's callback, which runs in the client's group.
 //
-// Each response is counted once: as an arrival of the client's callback, or in `arrived_`. Threads: any. The lock is
-// taken above those of callbacks and of the engine. It is not held while a request is sent or a response is taken: the
-// middleware calls wake() with its locks held.
+// Each response is counted until an attempt to take it: as an arrival of the client's callback, or in `arrived_`.
+// Threads: any. The lock is taken above those of callbacks and of the engine. It is not held while a request is sent or
+// a response is taken: the middleware calls wake() with its locks held.
 #pragma once
 
 #include <rmw/types.h>
@@ -94,7 +94,7 @@ class AwaitedCalls {
   void wake_callers() REDAG_REQUIRES(lock_);
   [[nodiscard]] bool is_sending() const REDAG_REQUIRES(lock_);
   [[nodiscard]] std::size_t settle() REDAG_REQUIRES(lock_);
-  [[nodiscard]] std::size_t uncount(std::size_t most) REDAG_REQUIRES(lock_);
+  void use_arrival() REDAG_REQUIRES(lock_);
   void leave_to_callback(std::size_t count) REDAG_EXCLUDES(lock_);
 
   const std::weak_ptr<rclcpp::ClientBase> client_;
@@ -102,10 +102,11 @@ class AwaitedCalls {
   std::atomic<std::size_t> awaited_{0};          // number of calls; written under the lock
   std::atomic<std::size_t> set_aside_count_{0};  // written under the lock
 
-  redag::PiMutex lock_;
+  redag::PiMutex taking_;  // of callers: the next attempt begins when the arrival of the last one has been used
+  redag::PiMutex lock_;    // taken after it
   std::weak_ptr<ResponseCallback> callback_ REDAG_GUARDED_BY(lock_);
   std::vector<Call *> calls_ REDAG_GUARDED_BY(lock_);
-  std::size_t arrived_ REDAG_GUARDED_BY(lock_) = 0;  // responses in the middleware or set aside, without an arrival
+  std::size_t arrived_ REDAG_GUARDED_BY(lock_) = 0;         // in the middleware, and no arrival of the callback
   std::vector<Response> unknown_ REDAG_GUARDED_BY(lock_);   // may be that of a request which is being sent
   std::deque<Response> set_aside_ REDAG_GUARDED_BY(lock_);  // for the client's callback
 };

@@ -301,7 +301,7 @@ void ReDAGExecutor::Core::report(const RaisedMiddleware &middleware, bool due) {
                {.rmw = rmw == nullptr || rmw->implementation_identifier == nullptr ? "the middleware"
                                                                                    : rmw->implementation_identifier,
                 .wanted = middleware.priority(),
-                .top_job = setup_.band.top_job,
+                .top_job = setup_.top_job_priority(),
                 .timer = setup_.timer_priority()});
   if (report.summary != middleware_summary_) RCLCPP_INFO(logger(), "%s", report.summary.c_str());
   middleware_summary_ = report.summary;
@@ -475,11 +475,15 @@ void ReDAGExecutor::Core::stop_workers() {
 
 void ReDAGExecutor::Core::spin_ready(nanoseconds max_duration, bool exhaustive) {
   const redag::Time end = max_duration.count() == 0 ? kNever : engine_->now() + max_duration.count();
+  bool first = true;  // it runs also if the time is over: collecting entities can take longer
   bool again = true;
   while (again) {
     admit(true);
     again = false;
-    while (hooks_.may_spin() && engine_->now() < end && run_one()) again = exhaustive;
+    while (hooks_.may_spin() && (first || engine_->now() < end) && run_one()) {
+      first = false;
+      again = exhaustive;
+    }
   }
 }
 

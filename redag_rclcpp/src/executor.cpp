@@ -114,7 +114,7 @@ void ReDAGExecutor::spin_some(nanoseconds max_duration) {
 }
 
 void ReDAGExecutor::spin_all(nanoseconds max_duration) {
-  if (max_duration < nanoseconds(0)) throw std::invalid_argument("max_duration must be at least 0");
+  if (max_duration < nanoseconds(0)) throw std::invalid_argument("max_duration must be greater than or equal to 0");
   const Spinning claimed(occupied_, spinning, "spin_all");
   if (!core_->begin_first_spin()) return;
   core_->spin_ready(max_duration, true);

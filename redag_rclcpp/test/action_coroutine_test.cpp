@@ -10,6 +10,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <set>
@@ -42,6 +43,8 @@ using CancelResponse = ActionClient::CancelResponse;
 constexpr int kRejected = 1000;
 constexpr int kAborted = 1001;
 constexpr int kNeverEnds = 1002;  // unless it is cancelled
+
+constexpr std::size_t kManyResponses = 1000;  // more than the clients of a test get together
 
 Fibonacci::Goal order(int number) {
   Fibonacci::Goal goal;
@@ -118,7 +121,11 @@ class ActionCoroutineTest : public ModeTest {
 
   ActionClient::SharedPtr create_client(const rclcpp::CallbackGroup::SharedPtr &group = nullptr,
                                         const std::string &name = "fibonacci") {
-    return rclcpp_action::create_client<Fibonacci>(node, name, group);
+    // A client's queues also receive the responses to other clients, of which ten could push out one of its own.
+    rcl_action_client_options_t client_options = rcl_action_client_get_default_options();
+    client_options.goal_service_qos.depth = kManyResponses;
+    client_options.result_service_qos.depth = kManyResponses;
+    return rclcpp_action::create_client<Fibonacci>(node, name, group, client_options);
   }
   /// A timer whose first call runs `body`; by default in the group of `client`.
   void once(const std::function<Coroutine()> &body, const rclcpp::CallbackGroup::SharedPtr &group = nullptr) {

@@ -240,6 +240,17 @@ TYPED_TEST(Conformance, SpinAllRunsUntilNothingIsLeft) {
   EXPECT_EQ(count, 30);
 }
 
+// Programs and rclcpp's own tests compare the text.
+TYPED_TEST(Conformance, SpinAllRefusesANegativeDuration) {
+  if (kEvents<TypeParam> || kCbg<TypeParam>) GTEST_SKIP() << "it says something else";
+  try {
+    this->executor->spin_all(-1ns);
+    ADD_FAILURE() << "it was taken";
+  } catch (const std::invalid_argument &error) {
+    EXPECT_STREQ(error.what(), "max_duration must be greater than or equal to 0");
+  }
+}
+
 TYPED_TEST(Conformance, SpinOnceRunsOneAndTimesOut) {
   int count = 0;
   auto subscription = this->node->template create_subscription<Empty>("empty", rclcpp::QoS(100),

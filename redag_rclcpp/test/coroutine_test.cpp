@@ -238,6 +238,53 @@ TEST_P(CoroutineTest, ManyCallsOfOneClientAtATime) {
   spin_until([&] { return answered == kCallers * kCalls; });
 }
 
+// All clients of a service receive its responses. While an urgent callback has the worker, those to another client
+// arrive, and then that of the call. Each time a response is taken, rmw_fastrtps drops one of them.
+TEST_P(CoroutineTest, AResponseBehindThoseToAnotherClient) {
+  constexpr int kOthers = 5;  // with that of the call, fewer than a client keeps
+  std::atomic<bool> serves{false};
+  std::atomic<int> served{0};
+  std::atomic<int> others_received{0};
+  const auto elsewhere = std::make_shared<rclcpp::Node>("elsewhere");
+  const auto service = elsewhere->create_service<Service>(
+      "twice", [&](const std::shared_ptr<Request> &request, const std::shared_ptr<Response> &response) {
+        while (!serves) std::this_thread::yield();
+        answer(*response, 2 * number_in(*request));
+        ++served;
+      });
+  const auto other = elsewhere->create_client<Service>("twice");
+  const auto client = client_of("twice");
+  ASSERT_TRUE(other->wait_for_service(kLimit));
+  ASSERT_TRUE(client->wait_for_service(kLimit));
+  for (int i = 0; i < kOthers; ++i) {
+    other->async_send_request(ask(1), [&](rclcpp::Client<Service>::SharedFuture) { ++others_received; });
+  }
+  std::atomic<bool> calls{false};
+  std::atomic<bool> answered{false};
+  timer(100ms, coroutine([&, once = std::make_shared<Once>()]() -> Coroutine {
+          if (!(*once)()) co_return;
+          calls = true;
+          const auto response = co_await call(client, ask(2));
+          EXPECT_EQ(number_in(*response), 4);
+          answered = true;
+        }));
+  timer(
+      1ms,
+      [&, once = std::make_shared<Once>()] {
+        if (!calls || !(*once)()) return;
+        serves = true;
+        const auto end = std::chrono::steady_clock::now() + 1s;  // in `os`, the request may not be sent yet
+        const auto all_are_sent = [&] { return served == kOthers + 1 && others_received == kOthers; };
+        while (!all_are_sent() && std::chrono::steady_clock::now() < end) std::this_thread::yield();
+        std::this_thread::sleep_for(20ms);  // the call's response is on its way
+      },
+      new_group());
+  rclcpp::executors::SingleThreadedExecutor executor;
+  executor.add_node(elsewhere);
+  const Spinner<rclcpp::executors::SingleThreadedExecutor> spinner(executor);
+  spin_until([&] { return answered.load(); });
+}
+
 TEST_P(CoroutineTest, ACallThatIsNotAnsweredEndsAtItsTimeout) {
   serve_never("never");
   serve("twice");

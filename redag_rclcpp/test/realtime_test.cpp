@@ -100,6 +100,22 @@ TEST_P(RealtimeTest, CollectingEntitiesIsNoneOfTheUrgentWork) {
 }
 
 // The thread that called spin() is an ordinary one. It gets no processor while jobs use all of them.
+// As with `chrt -f 10`. Without `os`, workers inherit that priority, and the middleware's threads are raised above it.
+TEST_P(RealtimeTest, NoWarningOfWorkersThatAreBelowTheMiddleware) {
+  if (redag::runtime::available_fifo_priority(11) < 11) GTEST_SKIP() << "this process may not use SCHED_FIFO 11";
+  const LogCapture log;
+  std::thread([&] {
+    ASSERT_TRUE(redag::runtime::set_fifo_priority(pthread_self(), 10));
+    ReDAGExecutor executor(options);
+    executor.add_node(node);
+    const rclcpp::TimerBase::SharedPtr timer = node->create_wall_timer(1ms, [&] {
+      if (log.has("have priority")) executor.cancel();
+    });
+    executor.spin();
+  }).join();
+  EXPECT_EQ(log.warnings_with("can delay messages"), 0);
+}
+
 TEST_P(RealtimeTest, CancelTakesEffectWhileJobsUseTheProcessor) {
   if (GetParam() != redag::PreemptionMode::Os) GTEST_SKIP() << "without real-time jobs all threads get their share";
   const int processor = redag::runtime::usable_cpus().back();

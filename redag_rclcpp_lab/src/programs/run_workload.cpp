@@ -3,6 +3,7 @@
 
 // `ros2 run redag_rclcpp_lab run_workload` runs a workload as real ROS 2 nodes on one executor, or on several in turn.
 #include <fmt/format.h>
+#include <pthread.h>
 #include <stdlib.h>
 
 #include <algorithm>
@@ -24,6 +25,7 @@
 #include "redag/base/text.hpp"
 #include "redag/model/clusters.hpp"
 #include "redag/model/workload_yaml.hpp"
+#include "redag/runtime/threads.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag_analysis/metrics/summary.hpp"
 #include "workload_comparison.hpp"
@@ -275,7 +277,8 @@ int compare(const redag::Workload &workload, const Arguments &arguments, const s
         "with several sinks, each figure is that of the worst one\n"
         "max is the largest of all runs; p50 to p99 are medians of the runs\n");
   }
-  if (real_time && results.size() > 1) {
+  const bool all_are_real_time = redag::runtime::fifo_priority(pthread_self()) > 0;  // they inherit it, as by chrt
+  if (real_time && !all_are_real_time && results.size() > 1) {
     fmt::print(
         "note: redag with preemption os had real-time (SCHED_FIFO) threads, the others not:\non a busy machine, this "
         "alone explains part of the difference\n");
