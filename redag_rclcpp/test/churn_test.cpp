@@ -4,6 +4,7 @@
 // Nodes, groups and entities come and go, from several threads and from callbacks, while the executor is busy. Entities
 // that stay must keep working, entities that go must be released, and no callback may run without cause. REDAG_SEED
 // chooses the changes, REDAG_CHURN_SECONDS their duration for each mode.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -202,7 +203,8 @@ class ChurnTest : public ::testing::TestWithParam<Parameters> {
     EXPECT_TRUE(eventually([&] {
       return steady->inner_received >= steady->sent && steady->outer_received >= steady->sent;
     })) << steady->sent
-        << " sent, " << steady->inner_received << " and " << steady->outer_received << " received";
+        << " sent, " << steady->inner_received << " and " << steady->outer_received << " received\n"
+        << counts_of(executor.stats());
     EXPECT_TRUE(eventually([&] { return steady->answered >= steady->asked; }))
         << steady->asked << " asked, " << steady->answered << " answered";
     // The executor forgets dropped nodes at the next change.
@@ -216,6 +218,16 @@ class ChurnTest : public ::testing::TestWithParam<Parameters> {
       const auto stats = executor.stats();
       return std::all_of(stats.begin(), stats.end(), [](const CallbackStats &s) { return s.jobs.in_flight() == 0; });
     }));
+  }
+
+  /// What became of each callback's jobs.
+  static std::string counts_of(const std::vector<CallbackStats> &stats) {
+    std::string text;
+    for (const CallbackStats &s : stats) {
+      text += fmt::format("{}: {} released, {} finished, {} skipped, {} aborted\n", s.task, s.jobs.released,
+                          s.jobs.finished, s.jobs.skipped, s.jobs.aborted);
+    }
+    return text;
   }
 
   /// At rest no job is in flight, and the executor's counts match those of the callbacks.
