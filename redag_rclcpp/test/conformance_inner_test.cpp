@@ -17,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include "compat.hpp"
 #include "conformance.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "rclcpp_action/rclcpp_action.hpp"
@@ -192,7 +193,7 @@ TYPED_TEST(Conformance, ACallbackServesAGroupOfItsNode) {
   // The node is in the executor, and the group is not. Each call makes a new one, as Nav2 does for each server.
   auto timer = this->node->create_wall_timer(5ms, [&] {
     GroupExecutor inner(*this->node);
-    const auto client = this->node->template create_client<Empty>("answer", rclcpp::ServicesQoS(), inner.group);
+    const auto client = this->node->template create_client<Empty>("answer", compat::services_qos(), inner.group);
     if (!client->wait_for_service(kLimit)) return;
     const std::thread::id caller = std::this_thread::get_id();
     const auto response = client->async_send_request(std::make_shared<Empty::Request>(),
