@@ -22,6 +22,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "redag/runtime/clock.hpp"
 #include "redag/runtime/threads.hpp"
 
 namespace redag::lab {
