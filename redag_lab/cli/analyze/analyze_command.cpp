@@ -25,7 +25,7 @@
 namespace redag::cli {
 namespace {
 
-struct Options {
+struct AnalyzeOptions {
   AnalysisArguments analysis;
   std::string executor = "redag";
   std::string explain;
@@ -71,7 +71,7 @@ bool find_in(const Parts &parts, const char *option, Console &console, Find find
 }
 
 // Finds what is asked of each part. Returns nothing, with an error on the console, if a task is unknown.
-std::optional<std::vector<Asked>> find_asked(const Parts &parts, const Options &options, Console &console) {
+std::optional<std::vector<Asked>> find_asked(const Parts &parts, const AnalyzeOptions &options, Console &console) {
   std::vector<Asked> asked(parts.size());
   for (const std::string &chain : options.chains) {
     const auto find = [&](std::size_t p) {
@@ -96,7 +96,7 @@ std::string heading(const ClusterPart &part, const StreamTraits &terminal) {
          (part.cpus.empty() ? "" : ", processors " + format_cpu_list(part.cpus)) + "\n";
 }
 
-std::string text_of(const lab::AnalysedPart &part, const Asked &asked, const Options &options,
+std::string text_of(const lab::AnalysedPart &part, const Asked &asked, const AnalyzeOptions &options,
                     const StreamTraits &terminal) {
   const bool every_task = options.analysis.run.all_tasks;
   std::string text;
@@ -111,7 +111,7 @@ std::string text_of(const lab::AnalysedPart &part, const Asked &asked, const Opt
   return text;
 }
 
-Json json_of(const lab::AnalysedPart &part, const Asked &asked, const Options &options) {
+Json json_of(const lab::AnalysedPart &part, const Asked &asked, const AnalyzeOptions &options) {
   Json document = to_json(part.analysed, options.methods);
   if (!asked.chains.empty()) document["chains"] = to_json(part.analysed, asked.chains);
   if (asked.row) {
@@ -120,7 +120,7 @@ Json json_of(const lab::AnalysedPart &part, const Asked &asked, const Options &o
   return document;
 }
 
-Json json_of(const Parts &parts, const std::vector<Asked> &asked, const Options &options) {
+Json json_of(const Parts &parts, const std::vector<Asked> &asked, const AnalyzeOptions &options) {
   if (!parts.front().part.is_cluster()) return json_of(parts.front(), asked.front(), options);
   Json document = {{"format", "redag.cluster_analysis/1"},
                    {"workload", parts.front().analysed.workload.name},
@@ -136,7 +136,7 @@ Json json_of(const Parts &parts, const std::vector<Asked> &asked, const Options 
 }
 
 // Reports one task or DAG in words, or the whole analysis. Returns false if that task or DAG is unknown.
-bool report(const Parts &parts, const Options &options, Console &console) {
+bool report(const Parts &parts, const AnalyzeOptions &options, Console &console) {
   const std::optional<std::vector<Asked>> asked = find_asked(parts, options, console);
   if (!asked) return false;
   if (options.analysis.run.json) {
@@ -165,7 +165,7 @@ std::string is_states(const std::string &text) {
 }
 
 // Analyses the workload. After Ctrl-C, the answers of the other methods remain.
-Result<Parts> analyse_configured(const Workload &workload, const Options &options, Console &console) {
+Result<Parts> analyse_configured(const Workload &workload, const AnalyzeOptions &options, Console &console) {
   const Result<analysis::AnalysisPlatform> configured = platform_for(workload, options.analysis, options.executor);
   if (!configured) return tl::unexpected(configured.error());
   const analysis::AnalysisPlatform &platform = *configured;
@@ -192,7 +192,7 @@ Result<Parts> analyse_configured(const Workload &workload, const Options &option
   return analysed;
 }
 
-int analyze_file(const Options &options, Console &console) {
+int analyze_file(const AnalyzeOptions &options, Console &console) {
   if (options.analysis.run.file.empty()) {
     const bool wants_file =
         options.analysis.run.json || !options.explain.empty() || !options.chains.empty() || options.explore > 0;
@@ -228,7 +228,7 @@ int analyze_file(const Options &options, Console &console) {
 }  // namespace
 
 Action add_analyze(CLI::App &app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<AnalyzeOptions>();
   app.add_option("FILE", options->analysis.run.file, "Workload file (YAML); - reads standard input")
       ->type_name("WORKLOAD");
   add_choice(app, "--executor", options->executor, executor_choices(),

@@ -21,7 +21,7 @@ namespace {
 
 enum class Keep : std::uint8_t { Nothing, Priorities, MaxActive };
 
-struct Options {
+struct AssignOptions {
   AnalysisArguments analysis;
   std::string output;
   Keep keep = Keep::Nothing;
@@ -43,7 +43,7 @@ Result<lab::Assignment> search(const Workload &workload, const analysis::Analysi
   return found;
 }
 
-bool write_result(const Options &options, const Workload &workload, bool is_changed, Console &console) {
+bool write_result(const AssignOptions &options, const Workload &workload, bool is_changed, Console &console) {
   if (options.output.empty()) return true;
   const Result<void> written =
       write_text(options.output, provenance_to_comment(current_provenance()) + to_yaml(workload));
@@ -56,7 +56,7 @@ bool write_result(const Options &options, const Workload &workload, bool is_chan
 }
 
 // With clusters: finds the clusters of the DAGs that name none.
-int assign_clusters(const Workload &workload, const Options &options, Console &console) {
+int assign_clusters(const Workload &workload, const AssignOptions &options, Console &console) {
   for (const CLI::Option *option : options.of_search) {
     if (option->count() == 0) continue;
     console.error(fmt::format("{}: 'assign' only chooses clusters for a workload with clusters", option->get_name()),
@@ -87,7 +87,7 @@ int assign_clusters(const Workload &workload, const Options &options, Console &c
   return options.analysis.run.check && !placement->is_schedulable() ? kExitNo : kExitOk;
 }
 
-int assign_file(const Options &options, Console &console) {
+int assign_file(const AssignOptions &options, Console &console) {
   const std::optional<Workload> workload =
       load_configured(options.analysis.run, console, {.cluster_optional = true, .waits = true}, "assign");
   if (!workload) return kExitBad;
@@ -130,7 +130,7 @@ int assign_file(const Options &options, Console &console) {
 }  // namespace
 
 Action add_assign(CLI::App &app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<AssignOptions>();
   lab::AssignmentOptions &assignment = options->assignment;
   app.add_option("FILE", options->analysis.run.file, "Workload file (YAML); - reads standard input")
       ->type_name("WORKLOAD")

@@ -23,7 +23,7 @@ constexpr std::uint32_t kMostReplicates = 1'000'000;
 constexpr double kMostTolerance = 0.99;  // at 1, all values would be equal
 constexpr std::size_t kMostShown = 10;
 
-struct Options {
+struct DiffOptions {
   std::string a;
   std::string b;
   lab::BootstrapOptions bootstrap;
@@ -42,7 +42,7 @@ std::string some_of(const std::vector<std::string> &items) {
 
 class Diffing {
  public:
-  Diffing(const Options &options, Console &console) : options_(options), console_(console), progress_(console) {}
+  Diffing(const DiffOptions &options, Console &console) : options_(options), console_(console), progress_(console) {}
 
   int run() {
     const InterruptGuard guard;
@@ -142,7 +142,7 @@ class Diffing {
     return true;
   }
 
-  const Options &options_;
+  const DiffOptions &options_;
   Console &console_;
   Progress progress_;
   Diffed diffed_;
@@ -151,7 +151,7 @@ class Diffing {
 }  // namespace
 
 Action add_diff(CLI::App &app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<DiffOptions>();
   app.add_option(
          "A", options->a,
          "Folder of a run or of its repetitions, as written by run, simulate, compare, or by run_workload of ROS 2")

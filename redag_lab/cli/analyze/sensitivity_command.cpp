@@ -23,7 +23,7 @@ namespace {
 constexpr std::uint32_t kMostProbes = 100'000;
 constexpr Duration kPeriods = 20;  // length of a simulation, in longest periods
 
-struct Options {
+struct SensitivityOptions {
   AnalysisArguments analysis;
   std::string task;
   std::uint32_t probes = lab::SensitivityOptions{}.probes;
@@ -70,7 +70,7 @@ Duration simulated_length(const Workload &workload) {
 }
 
 // Searches every knob. Returns the reason for an early end, or an empty text. Results found before the end remain.
-std::string search(Sensitivity &sensitivity, const std::vector<lab::Knob> &knobs, const Options &options,
+std::string search(Sensitivity &sensitivity, const std::vector<lab::Knob> &knobs, const SensitivityOptions &options,
                    AnalysisWatch &watch) {
   const analysis::AnalysisPlatform &platform = sensitivity.analysed.task_set.platform;
   const Workload &workload = sensitivity.analysed.workload;
@@ -102,7 +102,7 @@ std::string search(Sensitivity &sensitivity, const std::vector<lab::Knob> &knobs
   return {};
 }
 
-int sensitivity_of_file(const Options &options, Console &console) {
+int sensitivity_of_file(const SensitivityOptions &options, Console &console) {
   const std::optional<Workload> workload = load_without_clusters(options.analysis.run, "sensitivity", console);
   if (!workload) return kExitBad;
   const InterruptGuard guard;  // covers writing the results too
@@ -144,7 +144,7 @@ int sensitivity_of_file(const Options &options, Console &console) {
 }  // namespace
 
 Action add_sensitivity(CLI::App &app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<SensitivityOptions>();
   RunArguments &run = options->analysis.run;
   app.add_option("FILE", run.file, "Workload file (YAML); - reads standard input")->type_name("WORKLOAD")->required();
   app.add_option("--task", options->task, "Analyze one task (dag.task) or DAG only")->type_name("TASK");

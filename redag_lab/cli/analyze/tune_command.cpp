@@ -24,7 +24,7 @@ namespace {
 
 constexpr std::uint32_t kMostSeeds = 10'000;
 
-struct Options {
+struct TuneOptions {
   RunArguments run;
   lab::TuneOptions tune;
   std::string output;
@@ -104,7 +104,7 @@ int write(const std::string &path, const lab::Tuned &tuned, Console &console) {
   return kExitOk;
 }
 
-int tune_file(const Options &options, Console &console) {
+int tune_file(const TuneOptions &options, Console &console) {
   Tuning tuning;
   tuning.options = options.tune;
   tuning.options.bounds = !options.simulator_only;
@@ -160,7 +160,7 @@ int tune_file(const Options &options, Console &console) {
 }  // namespace
 
 Action add_tune(CLI::App &app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<TuneOptions>();
   lab::TuneOptions &tune = options->tune;
   app.add_option("FILE", options->run.file, "Workload file (YAML); - reads standard input")
       ->type_name("WORKLOAD")

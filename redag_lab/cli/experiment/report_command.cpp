@@ -30,7 +30,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct ReportOptions {
   std::vector<std::string> places;
   std::string output;
   bool json = false;
@@ -38,7 +38,7 @@ struct Options {
 
 class Reporting {
  public:
-  Reporting(const Options &options, Console &console) : options_(options), console_(console), progress_(console) {}
+  Reporting(const ReportOptions &options, Console &console) : options_(options), console_(console), progress_(console) {}
 
   int run() {
     Result<RecordedPlaces> found = find_recorded_runs(options_.places);
@@ -162,7 +162,7 @@ class Reporting {
     return ((fs::is_directory(first, ignored) ? first : first.parent_path()) / "report.html").string();
   }
 
-  const Options &options_;
+  const ReportOptions &options_;
   Console &console_;
   Progress progress_;
   std::vector<report::Group> groups_;
@@ -170,7 +170,7 @@ class Reporting {
 };
 
 // Writes the page of an experiment's folder, and says what it shows.
-int write_page(const Options &options, const fs::path &folder, const std::string &summary, const std::string &html,
+int write_page(const ReportOptions &options, const fs::path &folder, const std::string &summary, const std::string &html,
                Console &console) {
   const std::string path = options.output.empty() ? (folder / "report.html").string() : options.output;
   if (const Result<void> written = write_text(path, html); !written) {
@@ -190,7 +190,7 @@ int write_page(const Options &options, const fs::path &folder, const std::string
 }
 
 // Reports the folder of a factorial experiment, which becomes one page.
-int report_factorial(const Options &options, const fs::path &file, Console &console) {
+int report_factorial(const ReportOptions &options, const fs::path &file, Console &console) {
   const Result<std::string> text = trace::read_file(file.string());
   if (!text) {
     console.note(text.error());
@@ -211,7 +211,7 @@ int report_factorial(const Options &options, const fs::path &file, Console &cons
 }
 
 // Reports the folder of an acceptance experiment. Counts its units one by one, also those of a run that was killed.
-int report_acceptance(const Options &options, const std::string &folder, Console &console) {
+int report_acceptance(const ReportOptions &options, const std::string &folder, Console &console) {
   const auto refuse = [&console](const Diagnostics &mistakes) {
     console.note(mistakes);
     return kExitBad;
@@ -235,7 +235,7 @@ int report_acceptance(const Options &options, const std::string &folder, Console
   return write_page(options, folder, summary, acceptance_page(acceptance, counter.results(), runs), console);
 }
 
-int make_report(const Options &options, Console &console) {
+int make_report(const ReportOptions &options, Console &console) {
   for (const std::string &place : options.places) {
     std::error_code ignored;
     const fs::path factorial = fs::path(place) / "factorial.json";
@@ -253,7 +253,7 @@ int make_report(const Options &options, Console &console) {
 }  // namespace
 
 Action add_report(CLI::App &app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ReportOptions>();
   app.add_option("DIR", options->places,
                  "Folders of recorded runs (--out of run, simulate, compare), at any depth; or one folder of 'redag "
                  "experiment'")

@@ -15,14 +15,14 @@
 namespace redag::cli {
 namespace {
 
-struct Options {
+struct ExportOptions {
   bool prometheus = false;
   std::string endpoint = Endpoint().text();
   bool once = false;
   std::string folder = live::kFolder;
 };
 
-int print_once(const Options &options, Console &console) {
+int print_once(const ExportOptions &options, Console &console) {
   const Result<std::string> text = prometheus_text(options.folder);
   if (!text) {
     console.note(text.error());
@@ -32,7 +32,7 @@ int print_once(const Options &options, Console &console) {
   return kExitOk;
 }
 
-int serve(const Options &options, Console &console) {
+int serve(const ExportOptions &options, Console &console) {
   const Result<Endpoint> endpoint = parse_endpoint(options.endpoint);
   if (!endpoint) {
     console.note(endpoint.error());
@@ -56,7 +56,7 @@ int serve(const Options &options, Console &console) {
 }  // namespace
 
 Action add_export(CLI::App &app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ExportOptions>();
   CLI::Option *prometheus =
       app.add_flag("--prometheus", options->prometheus, "Serve the figures of all running executors to Prometheus");
   CLI::Option *listen = app.add_option("--listen", options->endpoint, "Address and port where Prometheus scrapes")

@@ -31,7 +31,7 @@ namespace {
 
 constexpr Duration kUsualInterval = kSecond;
 
-struct Options {
+struct ArrangeOptions {
   std::string file;
   bool apply = false;
   bool undo = false;
@@ -66,7 +66,7 @@ std::optional<robot::Robot> load_robot(const std::string &file, Console &console
   return std::move(input->robot);
 }
 
-std::optional<std::size_t> process_of_levels(const Options &options, const robot::Robot &robot, Console &console) {
+std::optional<std::size_t> process_of_levels(const ArrangeOptions &options, const robot::Robot &robot, Console &console) {
   std::vector<std::string> names;
   for (std::size_t p = 0; p < robot.processes.size(); ++p) {
     if (robot.processes[p].name == options.levels) return p;
@@ -78,7 +78,7 @@ std::optional<std::size_t> process_of_levels(const Options &options, const robot
 }
 
 // Returns what is on the host that the user names, or that has the process of --levels or the name of this machine.
-std::optional<robot::Robot> part_here(const Options &options, robot::Robot robot, Console &console) {
+std::optional<robot::Robot> part_here(const ArrangeOptions &options, robot::Robot robot, Console &console) {
   if (robot.hosts.empty()) {
     if (options.host.empty()) return robot;
     console.error(fmt::format("--host: {} has no hosts", options.file), "list them under 'hosts:', see docs/robot.md");
@@ -107,7 +107,7 @@ std::optional<robot::Robot> part_here(const Options &options, robot::Robot robot
 }
 
 // Returns the priorities to plan with. A plan alone needs no right to use them.
-std::optional<runtime::PriorityBand> band_for(const Options &options, Console &console) {
+std::optional<runtime::PriorityBand> band_for(const ArrangeOptions &options, Console &console) {
   const int available = runtime::available_fifo_priority(runtime::kHighestPriority);
   if (options.rtprio > 0) return runtime::band_up_to(static_cast<int>(options.rtprio));
   if (available > 0) return runtime::band_up_to(available);
@@ -120,7 +120,7 @@ std::optional<runtime::PriorityBand> band_for(const Options &options, Console &c
   return runtime::band_up_to(runtime::kHighestPriority);
 }
 
-std::optional<std::string> state_file(const Options &options, const robot::Robot &robot, Console &console) {
+std::optional<std::string> state_file(const ArrangeOptions &options, const robot::Robot &robot, Console &console) {
   if (!options.state.empty()) return options.state;
   const char *const own = std::getenv("XDG_RUNTIME_DIR");
   const std::string folder = geteuid() == 0 ? "/run" : own != nullptr ? own : "";
@@ -137,7 +137,7 @@ std::optional<std::string> state_file(const Options &options, const robot::Robot
   return fmt::format("{}/redag-arrange-{}.json", folder, name);
 }
 
-int print_levels(const Options &options, const robot::Robot &robot, const robot::Plan &plan, Console &console) {
+int print_levels(const ArrangeOptions &options, const robot::Robot &robot, const robot::Plan &plan, Console &console) {
   const std::optional<std::size_t> process = process_of_levels(options, robot, console);
   if (!process) return kExitBad;
   if (plan.of_executor[*process].empty()) {
@@ -156,7 +156,7 @@ robot::Changes changes_now(const robot::Robot &robot, const robot::Plan &plan, c
   return changes;
 }
 
-void show(const Options &options, const robot::Robot &robot, const robot::Plan &plan, const robot::Changes &changes,
+void show(const ArrangeOptions &options, const robot::Robot &robot, const robot::Plan &plan, const robot::Changes &changes,
           Console &console) {
   if (options.json) {
     console.print(to_text(to_json(robot, plan, changes)));
@@ -204,7 +204,7 @@ int apply_once(const robot::Changes &changes, robot::Arrangement &arrangement, C
 void end_by_hangup(int /*signal*/) { static_cast<void>(::raise(SIGTERM)); }
 
 // `shown`: the remarks that the user has seen.
-int watch(const Options &options, const robot::Robot &robot, const robot::Plan &plan, const robot::System &system,
+int watch(const ArrangeOptions &options, const robot::Robot &robot, const robot::Plan &plan, const robot::System &system,
           std::set<std::string> shown, robot::Arrangement &arrangement, Console &console) {
   std::signal(SIGHUP, end_by_hangup);
   int status = kExitOk;
@@ -231,7 +231,7 @@ int watch(const Options &options, const robot::Robot &robot, const robot::Plan &
   return std::max(undo(arrangement, console), status);
 }
 
-int arrange(const Options &options, Console &console) {
+int arrange(const ArrangeOptions &options, Console &console) {
   std::optional<robot::Robot> whole = load_robot(options.file, console);
   if (!whole) return kExitBad;
   const std::optional<robot::Robot> loaded = part_here(options, *std::move(whole), console);
@@ -273,7 +273,7 @@ int arrange(const Options &options, Console &console) {
 }  // namespace
 
 Action add_arrange(CLI::App &app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ArrangeOptions>();
   app.add_option("FILE", options->file, "Robot file (YAML); - reads standard input")->type_name("ROBOT")->required();
   CLI::Option *const dry =
       app.add_flag("--dry-run")->description("Show the plan, and what of it is not so yet (default)");

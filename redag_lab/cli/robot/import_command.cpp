@@ -14,12 +14,12 @@
 namespace redag::cli {
 namespace {
 
-struct Options {
+struct ImportOptions {
   std::string file;
   std::string output;
 };
 
-int import_configuration(const Options &options, Console &console) {
+int import_configuration(const ImportOptions &options, Console &console) {
   if (!options.output.empty()) {
     if (const Result<void> writable = check_output(options.output); !writable) {
       console.note(writable.error());
@@ -52,7 +52,7 @@ int import_configuration(const Options &options, Console &console) {
 }  // namespace
 
 Action add_import(CLI::App &app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ImportOptions>();
   app.add_option("FILE", options->file,
                  "Configuration of callback_isolated_executor (YAML): its template, or an edited one; - reads standard "
                  "input")

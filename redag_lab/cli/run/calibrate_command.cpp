@@ -23,7 +23,7 @@ namespace {
 
 constexpr Duration kLongest = kSecond * 3600 * 24;
 
-struct Options {
+struct CalibrateOptions {
   Duration duration = 30 * kSecond;
   bool loaded = false;
   bool json = false;
@@ -91,7 +91,7 @@ std::string describe(const Calibration &calibration, const StreamTraits &termina
   return text + "note: a measured maximum is no proof; a longer calibration can find a larger one\n";
 }
 
-Result<Calibration> measure(const Options &options, Console &console) {
+Result<Calibration> measure(const CalibrateOptions &options, Console &console) {
   Progress progress(console);
   progress.set_label("calibrate");
   const Stopwatch watch;
@@ -106,7 +106,7 @@ Result<Calibration> measure(const Options &options, Console &console) {
   return lab::calibrate(run);
 }
 
-int calibrate(const Options &options, Console &console) {
+int calibrate(const CalibrateOptions &options, Console &console) {
   if (options.duration > kLongest) {
     console.error(fmt::format("--duration: {} is longer than a day", format_duration(options.duration)));
     return kExitBad;
@@ -152,7 +152,7 @@ int calibrate(const Options &options, Console &console) {
 }  // namespace
 
 Action add_calibrate(CLI::App &app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CalibrateOptions>();
   add_duration(app, "--duration", options->duration, "Total time to measure")->default_str("30s");
   app.add_flag("--loaded", options->loaded, "Keep the machine busy with other threads for half of the time");
   app.add_option("--out", options->out, "File for the measured overheads")->type_name("FILE")->capture_default_str();

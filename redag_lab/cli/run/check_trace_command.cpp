@@ -16,7 +16,7 @@
 namespace redag::cli {
 namespace {
 
-struct Options {
+struct CheckTraceOptions {
   std::vector<std::string> places;
   bool json = false;
 };
@@ -39,7 +39,7 @@ Result<metrics::CheckReport> check_events(trace::EventsReader &reader) {
 
 class Checking {
  public:
-  Checking(const Options &options, Console &console) : options_(options), console_(console) {}
+  Checking(const CheckTraceOptions &options, Console &console) : options_(options), console_(console) {}
 
   int run() {
     for (const std::string &place : options_.places) {
@@ -91,7 +91,7 @@ class Checking {
                              describe_check(*report, console_.out_traits())));
   }
 
-  const Options &options_;
+  const CheckTraceOptions &options_;
   Console &console_;
   Json traces_ = Json::array();
   bool readable_ = true;
@@ -101,7 +101,7 @@ class Checking {
 }  // namespace
 
 Action add_check_trace(CLI::App &app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CheckTraceOptions>();
   app.add_option("PLACE", options->places,
                  "Traces (events.redag, events.jsonl), or folders that hold traces at any depth")
       ->type_name("RESULT")

@@ -22,7 +22,7 @@ constexpr Duration kThreadsDuration = 5 * kSecond;
 constexpr std::uint32_t kThreadsRepetitions = 3;
 constexpr std::uint32_t kMostRepetitions = 10'000;
 
-struct Options {
+struct CompareOptions {
   RunArguments run;
   std::string executors = "redag,mte,ste";
   std::uint32_t repeat = 0;  // 0: not given
@@ -31,7 +31,7 @@ struct Options {
 
 class Comparing {
  public:
-  Comparing(const Options &options, const Workload &workload, const lab::SessionOptions &session,
+  Comparing(const CompareOptions &options, const Workload &workload, const lab::SessionOptions &session,
             const std::vector<lab::Variant> &variants, std::uint32_t repetitions, Console &console)
       : options_(options),
         workload_(workload),
@@ -189,7 +189,7 @@ class Comparing {
     }
   }
 
-  const Options &options_;
+  const CompareOptions &options_;
   const Workload &workload_;
   lab::SessionOptions session_;
   std::uint32_t repetitions_;
@@ -201,7 +201,7 @@ class Comparing {
   bool has_picture_ = false;
 };
 
-int compare(const Options &options, Console &console) {
+int compare(const CompareOptions &options, Console &console) {
   const Result<std::vector<lab::Variant>> variants = lab::parse_variants(options.executors);
   if (!variants) {
     console.note(variants.error());
@@ -242,7 +242,7 @@ int compare(const Options &options, Console &console) {
 }  // namespace
 
 Action add_compare(CLI::App &app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CompareOptions>();
   add_workload_arguments(app, options->run);
   app.add_option("--executors", options->executors,
                  "Executors to compare: redag, redag-none, redag-cooperative, redag-os, mte, ste, static, events, cbg; "

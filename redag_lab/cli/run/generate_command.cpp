@@ -16,7 +16,7 @@
 namespace redag::cli {
 namespace {
 
-struct Options {
+struct GenerateOptions {
   lab::GenerateOptions generate;
   std::uint64_t seed = 1;
   std::string file;
@@ -125,7 +125,7 @@ std::string in_options(const CLI::App &app, const std::string &message) {
   return text;
 }
 
-int generate_workloads(const CLI::App &app, const Options &options, Console &console) {
+int generate_workloads(const CLI::App &app, const GenerateOptions &options, Console &console) {
   if (options.count > 1 && options.folder.empty()) {
     console.error("--count needs --out DIR, because one file holds one workload");
     return kExitBad;
@@ -181,7 +181,7 @@ int generate_workloads(const CLI::App &app, const Options &options, Console &con
 }  // namespace
 
 Action add_generate(CLI::App &app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<GenerateOptions>();
   add_seed(app, options->seed, "Seed; the same options and seed give the same workload everywhere");
   app.add_option("-o,--output", options->file, "File to write (default: standard output)")->type_name("FILE");
   add_count(app, "--count", options->count, {1, kMaxCount},

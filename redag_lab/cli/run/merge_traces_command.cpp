@@ -34,7 +34,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct MergeTracesOptions {
   std::string file;
   std::vector<std::string> hosts;
   std::vector<std::string> offsets;
@@ -56,7 +56,7 @@ Diagnostic mistake(std::string message, std::string hint = {}) {
 // Collects the hosts and links of the file, the command line and the robot.
 class Collector {
  public:
-  explicit Collector(const Options &options) : options_(options) {}
+  explicit Collector(const MergeTracesOptions &options) : options_(options) {}
 
   Result<hosts::HostList> run() {
     if (!options_.file.empty()) read_file();
@@ -193,7 +193,7 @@ class Collector {
                                    "give hosts the names of the robot's processes"});
   }
 
-  const Options &options_;
+  const MergeTracesOptions &options_;
   hosts::HostList list_;
   Diagnostics mistakes_;
 };
@@ -275,7 +275,7 @@ Result<std::optional<metrics::KernelWriter>> merge_kernels(const hosts::MergedRu
   return std::optional<metrics::KernelWriter>(*std::move(writer));
 }
 
-int merge(const Options &options, Console &console) {
+int merge(const MergeTracesOptions &options, Console &console) {
   const auto refuse = [&console](const Diagnostics &mistakes) {
     console.note(mistakes);
     return kExitBad;
@@ -317,7 +317,7 @@ int merge(const Options &options, Console &console) {
 }  // namespace
 
 Action add_merge_traces(CLI::App &app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<MergeTracesOptions>();
   const auto texts = [&app](const std::string &name, std::vector<std::string> &target, const char *type,
                             const std::string &help) {
     app.add_option(name, target, help)->type_name(type)->allow_extra_args(false);

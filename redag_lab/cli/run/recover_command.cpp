@@ -16,7 +16,7 @@
 namespace redag::cli {
 namespace {
 
-struct Options {
+struct RecoverOptions {
   std::string place;
   std::string folder;
   bool force = false;
@@ -47,7 +47,7 @@ Diagnostics warnings_of(const trace::Recovered &recovered) {
   return warnings;
 }
 
-int recover(const Options &options, Console &console) {
+int recover(const RecoverOptions &options, Console &console) {
   const std::string record = record_in(options.place);
   Result<trace::Recovered> recovered = trace::recover(record);
   if (!recovered) {
@@ -87,7 +87,7 @@ int recover(const Options &options, Console &console) {
 }  // namespace
 
 Action add_recover(CLI::App &app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<RecoverOptions>();
   app.add_option("DIR", options->place, "The --out folder of a killed run, or its record (then with --out)")
       ->type_name("DIR")
       ->required();

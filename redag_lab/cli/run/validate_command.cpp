@@ -16,7 +16,7 @@
 namespace redag::cli {
 namespace {
 
-struct Options {
+struct ValidateOptions {
   std::vector<std::string> files;
   bool strict = false;
   bool json = false;
@@ -99,7 +99,7 @@ std::string describe(const robot::Input &input) {
   return text + (text.empty() ? "" : ": ") + describe(facts_of(input.workload->workload));
 }
 
-int validate_files(const Options &options, Console &console) {
+int validate_files(const ValidateOptions &options, Console &console) {
   Json files = Json::array();
   bool all_ok = true;
   for (const std::string &file : options.files) {
@@ -131,7 +131,7 @@ int validate_files(const Options &options, Console &console) {
 }  // namespace
 
 Action add_validate(CLI::App &app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ValidateOptions>();
   app.add_option("FILE", options->files, "Files of workloads or robots (YAML); - reads standard input")
       ->type_name("WORKLOAD")
       ->required();

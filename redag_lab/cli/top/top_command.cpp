@@ -22,7 +22,7 @@
 namespace redag::cli {
 namespace {
 
-struct Options {
+struct TopOptions {
   std::string target;
   std::string folder = live::kFolder;
   Duration interval = kSecond;
@@ -37,7 +37,7 @@ struct Options {
 constexpr const char *kHowTo =
     "'redag run' publishes one by default; programs set ExecutorOptions::live, and ROS 2 nodes the parameter 'live'";
 
-int list(const Options &options, Console &console) {
+int list(const TopOptions &options, Console &console) {
   const std::vector<live::Listed> pages = live::list_pages(options.folder);
   const Time now = runtime::monotonic_now();
   if (options.json) {
@@ -50,7 +50,7 @@ int list(const Options &options, Console &console) {
   return kExitNo;
 }
 
-int show_once(const Options &options, const std::optional<LiveTarget> &target, Console &console) {
+int show_once(const TopOptions &options, const std::optional<LiveTarget> &target, Console &console) {
   std::vector<live::Listed> pages = live::list_pages(options.folder);
   std::erase_if(pages, [&](const live::Listed &listed) { return target && !target->names(listed); });
   const Time now = runtime::monotonic_now();
@@ -88,7 +88,7 @@ int show_once(const Options &options, const std::optional<LiveTarget> &target, C
   return kExitOk;
 }
 
-int show_all(const Options &options, Console &console) {
+int show_all(const TopOptions &options, Console &console) {
   const StreamTraits &out = console.out_traits();
   if (!options.once && !options.json && Screen::is_possible()) {
     return watch_machine({.folder = options.folder,
@@ -112,7 +112,7 @@ int show_all(const Options &options, Console &console) {
   return kExitNo;
 }
 
-int top(const Options &options, Console &console) {
+int top(const TopOptions &options, Console &console) {
   std::optional<LiveTarget> target;
   if (!options.target.empty()) {
     target = parse_target(options.target);
@@ -143,7 +143,7 @@ constexpr std::array kOrders{LiveOrder::Dag,     LiveOrder::Name,   LiveOrder::R
 }  // namespace
 
 Action add_top(CLI::App &app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<TopOptions>();
   LiveView &view = options->view;
   CLI::Option *target = app.add_option("PID", options->target,
                                        "Process ID; by default the only running executor, or a list to choose from");
