@@ -38,7 +38,8 @@ struct ReportOptions {
 
 class Reporting {
  public:
-  Reporting(const ReportOptions &options, Console &console) : options_(options), console_(console), progress_(console) {}
+  Reporting(const ReportOptions &options, Console &console)
+      : options_(options), console_(console), progress_(console) {}
 
   int run() {
     Result<RecordedPlaces> found = find_recorded_runs(options_.places);
@@ -170,8 +171,8 @@ class Reporting {
 };
 
 // Writes the page of an experiment's folder, and says what it shows.
-int write_page(const ReportOptions &options, const fs::path &folder, const std::string &summary, const std::string &html,
-               Console &console) {
+int write_page(const ReportOptions &options, const fs::path &folder, const std::string &summary,
+               const std::string &html, Console &console) {
   const std::string path = options.output.empty() ? (folder / "report.html").string() : options.output;
   if (const Result<void> written = write_text(path, html); !written) {
     console.note(written.error());

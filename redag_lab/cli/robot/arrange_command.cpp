@@ -66,7 +66,8 @@ std::optional<robot::Robot> load_robot(const std::string &file, Console &console
   return std::move(input->robot);
 }
 
-std::optional<std::size_t> process_of_levels(const ArrangeOptions &options, const robot::Robot &robot, Console &console) {
+std::optional<std::size_t> process_of_levels(const ArrangeOptions &options, const robot::Robot &robot,
+                                             Console &console) {
   std::vector<std::string> names;
   for (std::size_t p = 0; p < robot.processes.size(); ++p) {
     if (robot.processes[p].name == options.levels) return p;
@@ -156,8 +157,8 @@ robot::Changes changes_now(const robot::Robot &robot, const robot::Plan &plan, c
   return changes;
 }
 
-void show(const ArrangeOptions &options, const robot::Robot &robot, const robot::Plan &plan, const robot::Changes &changes,
-          Console &console) {
+void show(const ArrangeOptions &options, const robot::Robot &robot, const robot::Plan &plan,
+          const robot::Changes &changes, Console &console) {
   if (options.json) {
     console.print(to_text(to_json(robot, plan, changes)));
     return;
@@ -204,8 +205,8 @@ int apply_once(const robot::Changes &changes, robot::Arrangement &arrangement, C
 void end_by_hangup(int /*signal*/) { static_cast<void>(::raise(SIGTERM)); }
 
 // `shown`: the remarks that the user has seen.
-int watch(const ArrangeOptions &options, const robot::Robot &robot, const robot::Plan &plan, const robot::System &system,
-          std::set<std::string> shown, robot::Arrangement &arrangement, Console &console) {
+int watch(const ArrangeOptions &options, const robot::Robot &robot, const robot::Plan &plan,
+          const robot::System &system, std::set<std::string> shown, robot::Arrangement &arrangement, Console &console) {
   std::signal(SIGHUP, end_by_hangup);
   int status = kExitOk;
   while (!is_interrupted()) {
