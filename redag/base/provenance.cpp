@@ -28,11 +28,11 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kMostCommandBytes = 4096;
 
-struct Field {
+struct NamedText {
   const char *name;
   std::string Provenance::*value;
 };
-constexpr std::array<Field, 7> kFields = {{{"created", &Provenance::created},
+constexpr std::array<NamedText, 7> kNamedTexts = {{{"created", &Provenance::created},
                                            {"version", &Provenance::version},
                                            {"revision", &Provenance::revision},
                                            {"host", &Provenance::host},
@@ -40,7 +40,7 @@ constexpr std::array<Field, 7> kFields = {{{"created", &Provenance::created},
                                            {"command", &Provenance::command},
                                            {"calibration", &Provenance::calibration}}};
 
-class Calibration {
+class StatedCalibration {
  public:
   void set(std::string text) {
     const LockGuard guard(lock_);
@@ -56,8 +56,8 @@ class Calibration {
   std::string text_ REDAG_GUARDED_BY(lock_) = "none";
 };
 
-Calibration &calibration() {
-  static Calibration instance;
+StatedCalibration &calibration() {
+  static StatedCalibration instance;
   return instance;
 }
 
@@ -135,7 +135,7 @@ Result<std::optional<std::time_t>> source_date_epoch() {
 
 std::string provenance_to_json(const Provenance &provenance) {
   std::string text;
-  for (const Field &field : kFields) {
+  for (const NamedText &field : kNamedTexts) {
     text += fmt::format("{}\"{}\":{}", text.empty() ? "" : ",", field.name, as_json(provenance.*field.value));
   }
   return "{" + text + "}";
@@ -146,7 +146,7 @@ Result<Provenance> provenance_from_json(std::string_view text) {
   const Json json = Json::parse(text, nullptr, false);
   if (!json.is_object()) return make_error("the provenance must be an object");
   Provenance provenance;
-  for (const Field &field : kFields) {
+  for (const NamedText &field : kNamedTexts) {
     const auto found = json.find(field.name);
     if (found == json.end()) continue;
     if (!found->is_string()) return make_error(fmt::format("'{}' of the provenance must be a string", field.name));
@@ -157,7 +157,7 @@ Result<Provenance> provenance_from_json(std::string_view text) {
 
 std::string provenance_to_comment(const Provenance &provenance) {
   std::string text;
-  for (const Field &field : kFields) text += fmt::format("# {}: {}\n", field.name, as_json(provenance.*field.value));
+  for (const NamedText &field : kNamedTexts) text += fmt::format("# {}: {}\n", field.name, as_json(provenance.*field.value));
   return text;
 }
 

@@ -13,12 +13,12 @@
 namespace redag {
 namespace {
 
-using Kind = Callback::Kind;
+using CallbackKind = Callback::Kind;
 
 bool has_wildcard(std::string_view pattern) { return pattern.find_first_of("*?") != std::string_view::npos; }
 
 /// Formats a callback; `name`, `period` and `index` only if they are given.
-std::string describe(std::string_view node, Kind kind, std::string_view name, Duration period,
+std::string describe(std::string_view node, CallbackKind kind, std::string_view name, Duration period,
                      std::optional<std::uint32_t> index) {
   std::string text = fmt::format("{} {}", node, to_string(kind));
   if (!name.empty()) text += fmt::format(" {}", name);
@@ -31,7 +31,7 @@ std::string describe(std::string_view node, Kind kind, std::string_view name, Du
   return text;
 }
 
-bool is_counted(Kind kind) { return kind == Kind::Timer || kind == Kind::Waitable; }
+bool is_counted(CallbackKind kind) { return kind == CallbackKind::Timer || kind == CallbackKind::Waitable; }
 
 /// Formats the callback with only those parts that the pattern gives, so that only these are compared.
 std::string in_words_of(const Callback &pattern, const CallbackId &id) {
@@ -105,9 +105,9 @@ bool is_ros_internal(const CallbackId &id) {
       "change_state", "get_available_states", "get_available_transitions", "get_state", "get_transition_graph",
       // Component containers.
       "_container/list_nodes", "_container/load_node", "_container/unload_node"};
-  if (id.kind == Kind::Subscription) return std::find(kTopics.begin(), kTopics.end(), id.name) != kTopics.end();
-  if (id.kind == Kind::Waitable) return !id.name.empty();
-  if (id.kind != Kind::Service) return false;
+  if (id.kind == CallbackKind::Subscription) return std::find(kTopics.begin(), kTopics.end(), id.name) != kTopics.end();
+  if (id.kind == CallbackKind::Waitable) return !id.name.empty();
+  if (id.kind != CallbackKind::Service) return false;
   // The service must be the node's own: an application may offer "/map/get_state" in a node of another name.
   const std::size_t length = id.node.size();
   if (id.name.size() <= length || id.name.compare(0, length, id.node) != 0 || id.name[length] != '/') return false;

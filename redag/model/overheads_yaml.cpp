@@ -18,9 +18,9 @@ using yaml::Writer;
 
 constexpr std::size_t kMaxBytes = std::size_t{1} << 20U;
 
-class Reader : private yaml::ValueReader {
+class OverheadsReader : private yaml::ValueReader {
  public:
-  Reader(const Node &root, std::string file) : ValueReader(std::move(file)), root_(root) {}
+  OverheadsReader(const Node &root, std::string file) : ValueReader(std::move(file)), root_(root) {}
 
   Result<Calibration> run() {
     // `measured` is for people and is not read.
@@ -176,7 +176,7 @@ Result<Calibration> parse_calibration(std::string_view text, std::string file_na
   }
   const Result<Node> root = yaml::parse(text, file_name);
   if (!root) return tl::unexpected<Diagnostics>(root.error());
-  return Reader(*root, std::move(file_name)).run();
+  return OverheadsReader(*root, std::move(file_name)).run();
 }
 
 Result<Calibration> load_calibration(const std::filesystem::path &path) {

@@ -40,19 +40,19 @@ constexpr std::string_view kFormat = "redag.flight/1";
 constexpr std::size_t kBlockBytes = 4096;  // a page: if the process is killed, it is either the old or the new one
 constexpr std::uint64_t kMaxInfoBytes = std::uint64_t{1} << 30U;
 
-struct BlockHeader {
+struct FlightHeader {
   std::uint32_t crc = 0;       // of all later bytes in the block
   std::uint32_t count = 0;     // number of its events
   std::uint64_t sequence = 0;  // number of the block, from 1
   std::uint64_t first = 0;     // number of events before this block
   std::uint64_t lost = 0;      // number of events that the rings had lost by then
 };
-static_assert(sizeof(BlockHeader) == sizeof(JobEvent));
+static_assert(sizeof(FlightHeader) == sizeof(JobEvent));
 
-constexpr std::size_t kBlockEvents = (kBlockBytes - sizeof(BlockHeader)) / sizeof(JobEvent);
+constexpr std::size_t kBlockEvents = (kBlockBytes - sizeof(FlightHeader)) / sizeof(JobEvent);
 
 struct Block {
-  BlockHeader header;
+  FlightHeader header;
   std::array<JobEvent, kBlockEvents> events;
 };
 static_assert(sizeof(Block) == kBlockBytes);
@@ -61,7 +61,7 @@ std::uint32_t checksum(const Block &block) {
   // The layout is the file's: covers all bytes after the checksum.
   std::array<unsigned char, kBlockBytes> bytes;
   std::memcpy(bytes.data(), &block, bytes.size());
-  constexpr std::size_t kSkipped = sizeof(BlockHeader::crc);
+  constexpr std::size_t kSkipped = sizeof(FlightHeader::crc);
   return static_cast<std::uint32_t>(crc32(0, bytes.data() + kSkipped, static_cast<uInt>(bytes.size() - kSkipped)));
 }
 

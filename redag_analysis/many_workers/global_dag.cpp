@@ -248,7 +248,7 @@ class AgainstAll {
   global::Waiting waiting_;
 };
 
-Outcome apply_any(const TaskSet &task_set) {
+Outcome apply_dag(const TaskSet &task_set) {
   // A critical path waits only while all workers execute, or as many of its own tasks as max_active allows.
   const auto mode = task_set.mode == sched::Preemption::None ? sched::Preemption::None : sched::Preemption::Full;
   global::Units view = global::units_of(task_set, {.mode = mode, .bounds = true, .any_policy = true});
@@ -259,8 +259,8 @@ Outcome apply_any(const TaskSet &task_set) {
       [&](std::size_t k) { return all.respond(k); }, [&](std::size_t k) { return all.explain(k); });
 }
 
-Outcome apply_preemptive(const TaskSet &task_set) { return apply_bounded(task_set, sched::Preemption::Full); }
-Outcome apply_nonpreemptive(const TaskSet &task_set) { return apply_bounded(task_set, sched::Preemption::None); }
+Outcome apply_dag_preemptive(const TaskSet &task_set) { return apply_bounded(task_set, sched::Preemption::Full); }
+Outcome apply_dag_nonpreemptive(const TaskSet &task_set) { return apply_bounded(task_set, sched::Preemption::None); }
 
 }  // namespace
 
@@ -289,7 +289,7 @@ Method dag_bounded() {
           "m workers, full preemption, static priorities that keep DAGs together, one rate per DAG, R <= T; release "
           "jitter, shared levels, max_active of DAGs in one part; no shared groups",
       .complexity = "pseudo-polynomial; O(DAGs) per step",
-      .apply = [](const TaskSet &task_set) { return across_rates(task_set, apply_preemptive); },
+      .apply = [](const TaskSet &task_set) { return across_rates(task_set, apply_dag_preemptive); },
   };
 }
 
@@ -304,7 +304,7 @@ Method dag_any() {
           "m workers, full preemption or none, any work-conserving order (EDF, FIFO, interleaved priorities), one rate "
           "per DAG, R <= T for all; release jitter, shared levels, max_active of DAGs in one part; no shared groups",
       .complexity = "pseudo-polynomial; O(DAGs^2) per step, at most 1000 rounds",
-      .apply = apply_any,
+      .apply = apply_dag,
   };
 }
 
@@ -319,7 +319,7 @@ Method dag_nonpreemptive() {
           "m workers, jobs run to completion, static priorities that keep DAGs together, one rate per DAG, R <= T; "
           "release jitter, equal priorities, max_active of DAGs in one part; no shared groups",
       .complexity = "pseudo-polynomial; O(DAGs) per step",
-      .apply = [](const TaskSet &task_set) { return across_rates(task_set, apply_nonpreemptive); },
+      .apply = [](const TaskSet &task_set) { return across_rates(task_set, apply_dag_nonpreemptive); },
   };
 }
 

@@ -146,9 +146,9 @@ Outcome apply_response(const TaskSet &task_set) {
 }
 
 // Densities in units of 2^-40, rounded up.
-constexpr Int128 kOne = Int128{1} << 40;
+constexpr Int128 kDensityUnit = Int128{1} << 40;
 
-double as_double(Int128 value) { return static_cast<double>(value) / static_cast<double>(kOne); }
+double density_as_double(Int128 value) { return static_cast<double>(value) / static_cast<double>(kDensityUnit); }
 
 Outcome apply_density(const TaskSet &task_set) {
   const global::Units view = edf_units(task_set, sched::Preemption::Full);
@@ -167,16 +167,16 @@ Outcome apply_density(const TaskSet &task_set) {
                            "': its deadline is below those of its tasks"};
     }
     const Duration until = task.deadline - task.jitter;
-    const Int128 density = (unit.volume * kOne + until - 1) / until;
+    const Int128 density = (unit.volume * kDensityUnit + until - 1) / until;
     sum += density;
     largest = std::max(largest, density);
   }
   const Int128 m = view.workers;
-  const Int128 limit = m * kOne - (m - 1) * largest;
+  const Int128 limit = m * kDensityUnit - (m - 1) * largest;
   Bound bound;
-  bound.accepts = largest <= kOne && sum <= limit;
+  bound.accepts = largest <= kDensityUnit && sum <= limit;
   char text[96];
-  std::snprintf(text, sizeof text, "density = %.4f, limit %.4f", as_double(sum), as_double(limit));
+  std::snprintf(text, sizeof text, "density = %.4f, limit %.4f", density_as_double(sum), density_as_double(limit));
   bound.figures = text;
   return bound;
 }

@@ -24,7 +24,7 @@ using groups::Question;
 constexpr std::string_view kOverlap = "its response time can exceed 16 of its periods";
 constexpr std::string_view kMixed = "instances overlap, and data of two instances can meet where paths of its DAG join";
 constexpr std::string_view kSkipped = "a job can wait for so long that the next release skips it";
-constexpr std::string_view kBinds =
+constexpr std::string_view kBindsNow =
     "instances overlap so that its max_active binds, and it has groups and an overhead of preemption";
 constexpr int kMostRounds = 1000;
 
@@ -113,7 +113,7 @@ class Analysis {
       }
     }
     for (culprit = block.begin; culprit < block.end; ++culprit) {
-      if (binds_now(culprit)) return task_set_.platform.preempt_overhead > 0 ? kBinds : solve(b, culprit);
+      if (binds_now(culprit)) return task_set_.platform.preempt_overhead > 0 ? kBindsNow : solve(b, culprit);
       const std::string_view why = why_overlap_harms(b, culprit);
       if (!why.empty()) return why;
       for (const std::uint32_t t : tasks_of(culprit)) find_answer_from_ready(b, culprit, t);
@@ -283,7 +283,7 @@ class Analysis {
   bool changed_ = false;                  // in this round
 };
 
-Outcome apply(const TaskSet &task_set, Beyond beyond) {
+Outcome apply_within_groups(const TaskSet &task_set, Beyond beyond) {
   Analysis analysis(task_set, beyond);
   if (analysis.reason()) return NotApplicable{*analysis.reason()};
   if (analysis.preempts_too_often()) {
@@ -292,7 +292,7 @@ Outcome apply(const TaskSet &task_set, Beyond beyond) {
   return analysis.run();
 }
 
-Outcome apply_units(const TaskSet &task_set) { return apply(task_set, Beyond::Never); }
+Outcome apply_units(const TaskSet &task_set) { return apply_within_groups(task_set, Beyond::Never); }
 
 Outcome apply_groups(const TaskSet &task_set) {
   if (task_set.groups.empty()) return NotApplicable{"no exclusive group is shared: see the bounds without groups"};
@@ -300,7 +300,7 @@ Outcome apply_groups(const TaskSet &task_set) {
   if (task_set.platform.preempt_overhead > 0 && task_set.platform.workers == 1) {
     return NotApplicable{"groups cannot be combined with an overhead of preemption on one worker"};
   }
-  return is_across_rates(task_set) ? across_rates(task_set, apply_units) : apply(task_set, Beyond::Allowed);
+  return is_across_rates(task_set) ? across_rates(task_set, apply_units) : apply_within_groups(task_set, Beyond::Allowed);
 }
 
 }  // namespace

@@ -292,7 +292,7 @@ Outcome apply_guan(const TaskSet &task_set) {
   });
 }
 
-Outcome apply_nonpreemptive(const TaskSet &task_set) {
+Outcome apply_sequential_nonpreemptive(const TaskSet &task_set) {
   return from_most_urgent(task_set, {.mode = sched::Preemption::None, .edges = false, .equals = true},
                           [&task_set](global::Units &view, std::size_t k, bool alone, Duration &remaining) {
                             remaining = global::largest_remaining(task_set, view.units, k + 1, view.workers);
@@ -314,7 +314,7 @@ ResponseBound any_order_bound(const TaskSet &task_set, const GlobalUnit &unit) {
   return bound;
 }
 
-Outcome apply_any(const TaskSet &task_set) {
+Outcome apply_sequential(const TaskSet &task_set) {
   // A job waits only while all workers execute others, whether those can be preempted or not.
   const auto mode = task_set.mode == sched::Preemption::None ? sched::Preemption::None : sched::Preemption::Full;
   global::Units view = global::units_of(task_set, {.mode = mode, .edges = false, .any_policy = true});
@@ -367,7 +367,7 @@ Method bertogna_cirinei_any() {
       "m workers, full preemption or none, any work-conserving order (EDF, FIFO too), no edges, R <= T for all tasks; "
       "release jitter, shared levels; no shared groups";
   method.complexity = "pseudo-polynomial; O(n^2) per step, at most 50 rounds";
-  method.apply = apply_any;
+  method.apply = apply_sequential;
   return method;
 }
 
@@ -393,7 +393,7 @@ Method sequential_nonpreemptive() {
           "no "
           "shared groups",
       .complexity = "pseudo-polynomial; O(n) per step",
-      .apply = [](const TaskSet &task_set) { return across_rates(task_set, apply_nonpreemptive); },
+      .apply = [](const TaskSet &task_set) { return across_rates(task_set, apply_sequential_nonpreemptive); },
   };
 }
 

@@ -11,7 +11,7 @@ namespace redag::metrics {
 namespace {
 
 // True for two timer tasks whose jobs serve each other by release (docs/model.md, "Readiness").
-bool is_aligned(const Task &a, const Task &b) {
+bool release_together(const Task &a, const Task &b) {
   return a.activation == Activation::Timer && b.activation == Activation::Timer && a.period == b.period &&
          a.offset == b.offset;
 }
@@ -114,7 +114,7 @@ void JobLinks::complete(LinkedJob &job) const {
 
 // The job of `predecessor` whose data the job has: of an aligned task that of the same release, otherwise the newest.
 JobHandle JobLinks::data_of(TaskId predecessor, const LinkedJob &job) const {
-  const bool aligned = is_aligned(task(job.record.task), task(predecessor));
+  const bool aligned = release_together(task(job.record.task), task(predecessor));
   const std::deque<JobHandle> &finished = finished_[predecessor.value];
   JobHandle newest;
   for (auto one = finished.rbegin(); one != finished.rend(); ++one) {

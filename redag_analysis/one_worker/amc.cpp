@@ -27,7 +27,7 @@ bool can_be_torn(const TaskSet &task_set) {
   });
 }
 
-std::optional<std::string> why_not(const TaskSet &task_set) {
+std::optional<std::string> why_not_amc(const TaskSet &task_set) {
   if (!task_set.has_modes) return "no task has a wcet_low below its wcet, so there is no HI mode";
   if (auto reason = one_worker::why_not(task_set)) return reason;
   if (task_set.mode != sched::Preemption::Full) {
@@ -131,8 +131,8 @@ void bound_unit(const TaskSet &task_set, one_worker::Views &views, std::uint32_t
     bound.terms = terms_of(task_set, unit, view, others, low.found->window, change.found->window);
 }
 
-Outcome apply(const TaskSet &task_set) {
-  if (auto reason = why_not(task_set)) return NotApplicable{*reason};
+Outcome apply_amc(const TaskSet &task_set) {
+  if (auto reason = why_not_amc(task_set)) return NotApplicable{*reason};
   std::vector<ResponseBound> units(task_set.units.size());
   std::vector<ModeResponses> modes(task_set.units.size());
   bool low_is_met = true;
@@ -168,7 +168,7 @@ Method amc_rtb() {
           "DAGs of one rate as in dag_one_worker_preemptive, without jitter if of lower criticality; shared levels",
       .complexity = "pseudo-polynomial; O(n) per step",
       .knows_modes = true,
-      .apply = apply,
+      .apply = apply_amc,
   };
 }
 

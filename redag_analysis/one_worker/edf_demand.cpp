@@ -12,7 +12,7 @@
 namespace redag::analysis {
 namespace {
 
-constexpr int kMaxSteps = 1'000'000;
+constexpr int kMaxIntervals = 1'000'000;
 
 // A task as the demand sees it. Its deadline counts from its release as seen, which jitter delays.
 struct Demand {
@@ -23,7 +23,7 @@ struct Demand {
   Duration nominal_deadline = 0;
 };
 
-std::optional<std::string> why_not(const TaskSet &task_set) {
+std::optional<std::string> why_not_edf(const TaskSet &task_set) {
   if (task_set.platform.workers != 1)
     return "requires one worker, but the platform has " + std::to_string(task_set.platform.workers);
   if (task_set.policy != PolicyKind::Edf)
@@ -68,7 +68,7 @@ Duration demand_until(const std::vector<Demand> &demands, Duration t) {
 // The length of the longest busy period, blocking included; empty if the steps run out. T + J: releases as seen.
 std::optional<Duration> busy_period(const std::vector<Demand> &demands, Duration blocking) {
   Duration length = 1;
-  for (int step = 0; step < kMaxSteps && length < kUnbounded; ++step) {
+  for (int step = 0; step < kMaxIntervals && length < kUnbounded; ++step) {
     Int128 sum = blocking;
     Effort::spend(demands.size());
     for (const Demand &task : demands) {
@@ -114,15 +114,15 @@ Bound accept() {
 }
 
 // QPA: steps backwards from the end of the busy period, each time as far as the demand itself reaches.
-Outcome apply_preemptive(const TaskSet &task_set) {
-  if (auto reason = why_not(task_set)) return NotApplicable{*reason};
+Outcome apply_edf_preemptive(const TaskSet &task_set) {
+  if (auto reason = why_not_edf(task_set)) return NotApplicable{*reason};
   if (task_set.mode != sched::Preemption::Full) return NotApplicable{"requires full preemption"};
   const std::vector<Demand> demands = demands_of(task_set);
   const auto length = busy_period(demands, 0);
   if (!length) return refuse_overload();
   Duration t = deadline_below(demands, add(*length, 1));
   for (int step = 0; t > 0; ++step) {
-    if (step == kMaxSteps) return NotApplicable{"gave up: too many intervals must be examined"};
+    if (step == kMaxIntervals) return NotApplicable{"gave up: too many intervals must be examined"};
     const Duration demand = demand_until(demands, t);
     if (demand > t) return refuse(t, demand);
     // Between the demand and t no deadline can be missed; at equality the next deadline decides.
@@ -131,8 +131,8 @@ Outcome apply_preemptive(const TaskSet &task_set) {
   return accept();
 }
 
-Outcome apply_nonpreemptive(const TaskSet &task_set) {
-  if (auto reason = why_not(task_set)) return NotApplicable{*reason};
+Outcome apply_edf_nonpreemptive(const TaskSet &task_set) {
+  if (auto reason = why_not_edf(task_set)) return NotApplicable{*reason};
   if (task_set.mode == sched::Preemption::Full) return NotApplicable{"requires jobs that keep the worker"};
   const std::vector<Demand> demands = demands_of(task_set);
   Duration longest = 0;
@@ -142,7 +142,7 @@ Outcome apply_nonpreemptive(const TaskSet &task_set) {
   // Blocking falls with t. The demand can therefore not be followed backwards, and every deadline is examined.
   int step = 0;
   for (Duration t = deadline_below(demands, add(*length, 1)); t > 0; t = deadline_below(demands, t)) {
-    if (++step > kMaxSteps) return NotApplicable{"gave up: too many intervals must be examined"};
+    if (++step > kMaxIntervals) return NotApplicable{"gave up: too many intervals must be examined"};
     Duration blocking = 0;
     for (const Demand &task : demands) {
       if (task.nominal_deadline > t) blocking = std::max(blocking, task.blocking);
@@ -167,7 +167,7 @@ Method edf_demand() {
           "one worker, full preemption, edf, no edges, deadlines before the next release is refused, jitter below the "
           "deadline, no shared groups, no max_active",
       .complexity = "pseudo-polynomial; O(n) per interval",
-      .apply = apply_preemptive,
+      .apply = apply_edf_preemptive,
   };
 }
 
@@ -184,7 +184,7 @@ Method edf_demand_nonpreemptive() {
           "release "
           "is refused, jitter below the deadline; groups and max_active where jobs run to completion",
       .complexity = "pseudo-polynomial; O(n) per interval",
-      .apply = apply_nonpreemptive,
+      .apply = apply_edf_nonpreemptive,
   };
 }
 

@@ -40,7 +40,7 @@ bool fits(Duration start, Duration point, const std::vector<one_worker::Interfer
   return demand <= point;
 }
 
-std::optional<std::string> why_not(const TaskSet &task_set) {
+std::optional<std::string> why_not_exact(const TaskSet &task_set) {
   if (auto reason = one_worker::why_not(task_set)) return reason;
   if (task_set.mode != sched::Preemption::Full) return "requires full preemption";
   for (const Unit &unit : task_set.units) {
@@ -53,8 +53,8 @@ std::optional<std::string> why_not(const TaskSet &task_set) {
   return std::nullopt;
 }
 
-Outcome apply(const TaskSet &task_set) {
-  if (auto reason = why_not(task_set)) return NotApplicable{*reason};
+Outcome apply_exact_points(const TaskSet &task_set) {
+  if (auto reason = why_not_exact(task_set)) return NotApplicable{*reason};
   Bound bound;
   bound.accepts = true;
   std::size_t examined = 0;
@@ -91,7 +91,7 @@ Method exact_points() {
           "as "
           "one task with C = volume",
       .complexity = "O(n 2^n) in the worst case, far less in practice",
-      .apply = apply,
+      .apply = apply_exact_points,
   };
 }
 

@@ -16,7 +16,7 @@ namespace {
 // execution times up to 2^50 ns (13 days).
 constexpr int kShareBits = 40;
 constexpr int kTimeBits = 16;
-constexpr Int128 kOne = Int128{1} << kShareBits;
+constexpr Int128 kShareUnit = Int128{1} << kShareBits;
 constexpr Duration kLongest = Duration{1} << 50;
 
 Int128 ceil_of(Int128 numerator, Int128 denominator) { return (numerator + denominator - 1) / denominator; }
@@ -43,12 +43,12 @@ ResponseBound bound_unit(const TaskSet &task_set, const one_worker::Views &views
   Duration blocking = 0;
   for (const one_worker::Blocker &blocker : blockers) blocking = add(blocking, blocker.amount);
   ResponseBound bound;
-  if (utilization + ceil_of(Int128{unit.volume} << kShareBits, unit.period) > kOne) {
+  if (utilization + ceil_of(Int128{unit.volume} << kShareBits, unit.period) > kShareUnit) {
     bound.absent = "the utilization of its level may exceed one";
     return bound;
   }
   const Int128 fixed = (Int128{blocking} + unit.volume) << kTimeBits;
-  const Int128 rest = kOne - utilization;  // > 0, because the unit's own share is
+  const Int128 rest = kShareUnit - utilization;  // > 0, because the unit's own share is
   const Duration response = saturate(((fixed + slopes) << (kShareBits - kTimeBits)) / rest);
   if (response > unit.limit) {
     bound.absent = one_worker::kExceedsLimit;
@@ -71,7 +71,7 @@ ResponseBound bound_unit(const TaskSet &task_set, const one_worker::Views &views
   return bound;
 }
 
-Outcome apply(const TaskSet &task_set) {
+Outcome apply_linear(const TaskSet &task_set) {
   if (auto reason = one_worker::why_not(task_set)) return NotApplicable{*reason};
   if (task_set.mode != sched::Preemption::Full) return NotApplicable{"requires full preemption"};
   for (const Unit &unit : task_set.units) {
@@ -105,7 +105,7 @@ Method linear_bound() {
           "one worker, full preemption, static priorities, any deadlines, no jitter; blocking added; a DAG of one rate "
           "counts as one task with C = volume",
       .complexity = "O(n log n)",
-      .apply = apply,
+      .apply = apply_linear,
   };
 }
 

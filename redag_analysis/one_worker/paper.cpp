@@ -18,7 +18,7 @@
 namespace redag::analysis {
 namespace {
 
-constexpr int kMaxSteps = 1'000'000;
+constexpr int kMaxIterations = 1'000'000;
 
 // Returns the first assumption of the paper's equations that does not hold here; empty if all hold.
 std::string broken_assumption(const TaskSet &task_set, bool with_blocking) {
@@ -78,7 +78,7 @@ std::span<const Rate> more_urgent(std::span<const Rate> rates, const CompiledTas
 // R = start + sum ceil(R / T_j) C_j up to `limit`.
 std::optional<Duration> recurrence(Duration start, std::span<const Rate> others, Duration limit) {
   Duration response = start;
-  for (int step = 0; step < kMaxSteps && response <= limit; ++step) {
+  for (int step = 0; step < kMaxIterations && response <= limit; ++step) {
     Effort::spend(others.size() + 1);
     Int128 sum = start;
     for (const Rate &rate : others) sum += Int128{ceil_div(response, rate.period)} * rate.wcet;
@@ -188,7 +188,7 @@ Outcome apply_recurrence(const TaskSet &task_set, bool with_blocking) {
 Outcome apply_rta(const TaskSet &task_set) { return apply_recurrence(task_set, false); }
 Outcome apply_rta_blocking(const TaskSet &task_set) { return apply_recurrence(task_set, true); }
 
-Method make(std::string_view name, Subject subject, std::string_view equation, std::string_view sound_only_if,
+Method make_paper_method(std::string_view name, Subject subject, std::string_view equation, std::string_view sound_only_if,
             std::string_view complexity, Outcome (*apply)(const TaskSet &)) {
   return Method{
       .name = name,
@@ -204,26 +204,26 @@ Method make(std::string_view name, Subject subject, std::string_view equation, s
 }  // namespace
 
 Method paper_rm_bound() {
-  return make("paper_rm_bound", Subject::TaskSet, "ReDAG-RT, eq. rm_bound",
+  return make_paper_method("paper_rm_bound", Subject::TaskSet, "ReDAG-RT, eq. rm_bound",
               "one worker, full preemption, rate-monotonic order, D >= T, no jitter, no blocking; DAGs of one rate",
               "O(n)", apply_rm_bound);
 }
 
 Method paper_interference() {
-  return make("paper_interference", Subject::Task, "ReDAG-RT, eq. interference",
+  return make_paper_method("paper_interference", Subject::Task, "ReDAG-RT, eq. interference",
               "one worker, full preemption, rate_monotonic, different periods, no edges, jitter or blocking, and no "
               "more urgent task is released again before the task ends",
               "O(n) per task", apply_interference);
 }
 
 Method paper_rta() {
-  return make("paper_rta", Subject::Task, "ReDAG-RT, eqs. rta and rta_convergence",
+  return make_paper_method("paper_rta", Subject::Task, "ReDAG-RT, eqs. rta and rta_convergence",
               "one worker, full preemption, rate_monotonic, different periods, no edges, jitter or blocking; R <= T",
               "pseudo-polynomial; O(n) per step", apply_rta);
 }
 
 Method paper_rta_blocking() {
-  return make("paper_rta_blocking", Subject::Task, "ReDAG-RT, eq. rta_blocking; B_i as on one worker",
+  return make_paper_method("paper_rta_blocking", Subject::Task, "ReDAG-RT, eq. rta_blocking; B_i as on one worker",
               "one worker, rate_monotonic, different periods, no edges or jitter; R <= T",
               "pseudo-polynomial; O(n) per step", apply_rta_blocking);
 }

@@ -18,15 +18,15 @@
 namespace redag::analysis {
 namespace {
 
-constexpr Int128 kOne = Int128{1} << 60;  // utilizations in units of 2^-60, to be shown
+constexpr Int128 kUtilizationUnit = Int128{1} << 60;  // utilizations in units of 2^-60, to be shown
 
 Int128 rounded(const ShareRange &range) { return static_cast<Int128>(range.low); }
 
-double as_double(Int128 value) { return static_cast<double>(value) / static_cast<double>(kOne); }
+double utilization_as_double(Int128 value) { return static_cast<double>(value) / static_cast<double>(kUtilizationUnit); }
 
 std::string figures(const char *name, Int128 value, Int128 limit) {
   char text[96];
-  std::snprintf(text, sizeof text, "%s = %.4f, limit %.4f", name, as_double(value), as_double(limit));
+  std::snprintf(text, sizeof text, "%s = %.4f, limit %.4f", name, utilization_as_double(value), utilization_as_double(limit));
   return text;
 }
 
@@ -122,7 +122,7 @@ Outcome apply_hyperbolic(const TaskSet &task_set) {
   Prepared prepared;
   if (auto reason = prepare(task_set, false, prepared)) return NotApplicable{*reason};
   const Shares shares = shares_of(task_set);
-  return answer(is_within_hyperbolic(shares), figures("prod (U_i + 1)", rounded(shares.product()), 2 * kOne));
+  return answer(is_within_hyperbolic(shares), figures("prod (U_i + 1)", rounded(shares.product()), 2 * kUtilizationUnit));
 }
 
 // A maximum matching between periods and their multiples (Kuhn); each unmatched period starts a chain. Units of one
@@ -223,7 +223,7 @@ Outcome apply_liu_layland_blocking(const TaskSet &task_set) {
 Outcome apply_hyperbolic_blocking(const TaskSet &task_set) {
   return apply_by_level(
       task_set, [](const Shares &shares) { return is_within_hyperbolic(shares); },
-      [](const Shares &shares) { return figures("product", rounded(shares.product()), 2 * kOne); });
+      [](const Shares &shares) { return figures("product", rounded(shares.product()), 2 * kUtilizationUnit); });
 }
 
 // Returns why a global test does not apply. It needs m workers, full preemption and independent tasks, and that only
@@ -264,8 +264,8 @@ Outcome apply_global_rm_light(const TaskSet &task_set) {
   const Shares most = largest(shares);
   const bool fits = is_sum_within(shares, m * m, 3 * m - 2) && is_sum_within(most, m, 3 * m - 2);
   const auto divisor = static_cast<Int128>(3 * m - 2);
-  return answer(fits, figures("U", rounded(shares.sum()), static_cast<Int128>(m * m) * kOne / divisor) + "; " +
-                          figures("max U_i", rounded(most.sum()), static_cast<Int128>(m) * kOne / divisor));
+  return answer(fits, figures("U", rounded(shares.sum()), static_cast<Int128>(m * m) * kUtilizationUnit / divisor) + "; " +
+                          figures("max U_i", rounded(most.sum()), static_cast<Int128>(m) * kUtilizationUnit / divisor));
 }
 
 Outcome apply_global_rm_utilization(const TaskSet &task_set) {
@@ -276,7 +276,7 @@ Outcome apply_global_rm_utilization(const TaskSet &task_set) {
   Shares weighted;  // 2 U + (m - 2) u <= m
   for (const Share &share : shares.all()) weighted.push({share.amount * 2, share.period});
   for (const Share &share : most.all()) weighted.push({share.amount * (m - 2), share.period});
-  const Int128 limit = (static_cast<Int128>(m) * (kOne - rounded(most.sum())) + 2 * rounded(most.sum())) / 2;
+  const Int128 limit = (static_cast<Int128>(m) * (kUtilizationUnit - rounded(most.sum())) + 2 * rounded(most.sum())) / 2;
   return answer(is_sum_within(most, 1, 1) && is_sum_within(weighted, m, 1), figures("U", rounded(shares.sum()), limit));
 }
 

@@ -156,7 +156,7 @@ class Executor {
   std::vector<Callback> callbacks_;  // by TaskId
 };
 
-std::optional<std::string> why_not(const TaskSet &task_set) {
+std::optional<std::string> why_not_rates(const TaskSet &task_set) {
   if (auto reason = why_not_directly(task_set)) return reason;
   if (task_set.mode != sched::Preemption::None) return "rclcpp's executors do not preempt";
   if (!task_set.groups.empty()) return "with exclusive groups, the callbacks of a busy group can miss every window";
@@ -167,7 +167,7 @@ std::optional<std::string> why_not_one_thread(const TaskSet &task_set) {
   if (task_set.platform.workers != 1) {
     return "requires one thread, but the platform has " + std::to_string(task_set.platform.workers) + " workers";
   }
-  return why_not(task_set);
+  return why_not_rates(task_set);
 }
 
 // Where all keep J + R <= T, the published busy window holds one job of each callback (docs/analysis.md, "rclcpp's
@@ -265,7 +265,7 @@ Outcome apply_blass(const TaskSet &task_set) {
 }
 
 Outcome apply_rates(const TaskSet &task_set) {
-  if (auto reason = why_not(task_set)) return NotApplicable{*reason};
+  if (auto reason = why_not_rates(task_set)) return NotApplicable{*reason};
   const std::uint32_t threads = task_set.platform.workers;
   const Duration longest = kUnbounded / 4 / threads / static_cast<Duration>(task_set.tasks.size() + 2);
   for (const Unit &unit : task_set.units) {
@@ -280,7 +280,7 @@ constexpr std::string_view kOneThread =
     "rclcpp's SingleThreadedExecutor of Humble with a processor of its own, timers polled like subscriptions; one rate "
     "per DAG with edges, J + R <= T for all tasks; release jitter; no shared exclusive groups";
 
-Method make(std::string_view name, std::string_view cite, std::string_view assumptions, std::string_view complexity,
+Method make_wait_set_method(std::string_view name, std::string_view cite, std::string_view assumptions, std::string_view complexity,
             Outcome (*apply)(const TaskSet &)) {
   return Method{
       .name = name,
@@ -295,21 +295,21 @@ Method make(std::string_view name, std::string_view cite, std::string_view assum
 }  // namespace
 
 Method casini() {
-  return make("casini",
+  return make_wait_set_method("casini",
               "D. Casini, T. Blass, I. Luetkebohle, B. Brandenburg, Response-time analysis of ROS 2 processing chains "
               "under reservation-based scheduling, ECRTS 2019",
               kOneThread, "O(tasks^2) per round, at most 1000 rounds", apply_casini);
 }
 
 Method blass() {
-  return make("blass",
+  return make_wait_set_method("blass",
               "T. Blass, D. Casini, S. Bozhko, B. Brandenburg, A ROS 2 response-time analysis exploiting starvation "
               "freedom and execution-time variance, RTSS 2021 (theorem 2, without execution-time curves)",
               kOneThread, "pseudo-polynomial; O(tasks^2) per step, at most 1000 rounds", apply_blass);
 }
 
 Method wait_set_rates() {
-  return make(
+  return make_wait_set_method(
       "wait_set_rates",
       "docs/analysis.md, \"rclcpp's executors\"; after T. Blass et al., RTSS 2021; in place of X. Jiang et al., "
       "RTSS 2022, and H. Sobhani, H. Choi, H. Kim, RTAS 2023",

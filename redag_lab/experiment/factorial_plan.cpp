@@ -18,7 +18,7 @@
 namespace redag::experiment {
 namespace {
 
-constexpr std::uint64_t kMostUnits = 10'000'000;
+constexpr std::uint64_t kMostFactorialUnits = 10'000'000;
 constexpr std::uint64_t kMostCombinations = 1'000'000;
 
 template <class Values, class Text>
@@ -62,9 +62,9 @@ bool applies(const FactorialPlan &plan, FactorKind kind, std::string_view execut
   }
 }
 
-class Checker {
+class FactorialChecker {
  public:
-  Checker(const FactorialPlan &plan, const ExecutorNames &executors) : plan_(plan), executors_(executors) {}
+  FactorialChecker(const FactorialPlan &plan, const ExecutorNames &executors) : plan_(plan), executors_(executors) {}
 
   std::vector<PlanMistake> run() {
     if (!is_plan_name(plan_.name)) say("name", "a name consists of one or more letters, digits, - and _");
@@ -84,9 +84,9 @@ class Checker {
       say("executors", fmt::format("the plan has more than {} combinations", kMostCombinations),
           "shorten the plan's lists, or split the plan");
     }
-    if (mistakes_.empty() && points_of(plan_).size() > kMostUnits / plan_.repetitions) {
+    if (mistakes_.empty() && points_of(plan_).size() > kMostFactorialUnits / plan_.repetitions) {
       say("repetitions", fmt::format("{} combinations with {} repetitions are more than {} runs",
-                                     points_of(plan_).size(), plan_.repetitions, kMostUnits));
+                                     points_of(plan_).size(), plan_.repetitions, kMostFactorialUnits));
     }
     return std::move(mistakes_);
   }
@@ -260,7 +260,7 @@ std::string describe(const FactorialPlan &plan, const FactorialPoint &point) {
 }
 
 std::vector<PlanMistake> find_mistakes(const FactorialPlan &plan, const ExecutorNames &executors) {
-  return Checker(plan, executors).run();
+  return FactorialChecker(plan, executors).run();
 }
 
 }  // namespace redag::experiment

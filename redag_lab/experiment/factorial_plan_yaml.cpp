@@ -23,27 +23,27 @@ namespace {
 using yaml::find;
 using yaml::Node;
 
-constexpr std::array kWorlds = {World::Simulator, World::Threads, World::Ros2};
+constexpr std::array kFactorialWorlds = {World::Simulator, World::Threads, World::Ros2};
 
-const std::vector<std::string_view> kTopKeys = {
+const std::vector<std::string_view> kFactorialKeys = {
     "experiment", "name",        "world",         "seed",           "repetitions", "duration",
     "warm_up",    "overheads",   "paper_startup", "quantiles",      "workloads",   "policies",
     "workers",    "utilization", "demand_scale",  "deadline_scale", "max_active",  "executors"};
 
-class Reader : private PlanReader {
+class FactorialReader : private PlanReader {
  public:
-  Reader(const Node &root, std::string file, const ExecutorNames &executors)
+  FactorialReader(const Node &root, std::string file, const ExecutorNames &executors)
       : PlanReader(std::move(file)), root_(root), executors_(executors) {}
 
   Result<FactorialPlan> run() {
     return read_plan(
-        root_, "factorial", kTopKeys, plan_, [this] { read(); }, [this] { return find_mistakes(plan_, executors_); });
+        root_, "factorial", kFactorialKeys, plan_, [this] { read(); }, [this] { return find_mistakes(plan_, executors_); });
   }
 
  private:
   void read() {
     take_text(root_, "name", plan_.name);
-    take_enum(root_, "world", plan_.world, kWorlds);
+    take_enum(root_, "world", plan_.world, kFactorialWorlds);
     take_seed(root_, plan_.seed);
     take_count(root_, "repetitions", plan_.repetitions, 1);
     take_duration(root_, "duration", plan_.duration);
@@ -207,7 +207,7 @@ Result<FactorialPlan> parse_factorial_plan(std::string_view text, const std::str
                                            const ExecutorNames &executors) {
   const Result<Node> root = yaml::parse(text, file);
   if (!root) return tl::unexpected<Diagnostics>(root.error());
-  return Reader(*root, file, executors).run();
+  return FactorialReader(*root, file, executors).run();
 }
 
 Result<FactorialPlan> load_factorial_plan(const std::string &path, const ExecutorNames &executors) {

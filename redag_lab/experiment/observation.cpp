@@ -24,7 +24,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 using metrics::JobRecord;
 
-constexpr std::array<const char *, kMeasureCount> kNames = {
+constexpr std::array<const char *, kMeasureCount> kQuantityNames = {
     "released",           "finished",     "late",         "dropped",       "aborted",        "missed",
     "deferred",           "preemptions",  "max_lateness", "response_mean", "response_p50",   "response_p95",
     "response_p99",       "response_max", "peak_active",  "paper_jobs",    "paper_late",     "paper_max_lateness",
@@ -95,7 +95,7 @@ std::vector<Duration> work_of(const trace::Trace &trace, std::size_t tasks) {
 
 }  // namespace
 
-const char *to_string(Measure measure) { return kNames[static_cast<std::size_t>(measure)]; }
+const char *to_string(Measure measure) { return kQuantityNames[static_cast<std::size_t>(measure)]; }
 
 Observation observe(const FinishedRun &run, const ObserveOptions &options) {
   const trace::RunInfo &info = run.trace.info;

@@ -18,9 +18,9 @@ namespace {
 constexpr std::size_t kMostSuspects = 6;
 constexpr double kLittle = 0.9;  // a remedy that keeps at least this share of an execution time counts as small
 
-class Search {
+class RemedySearch {
  public:
-  Search(const Workload &workload, const analysis::AnalysisPlatform &platform)
+  RemedySearch(const Workload &workload, const analysis::AnalysisPlatform &platform)
       : workload_(workload), platform_(platform) {}
 
   std::optional<std::string> run(const std::vector<TaskId> &suspects) {
@@ -117,7 +117,7 @@ class Search {
 std::optional<std::string> find_remedy(const Workload &workload, const analysis::AnalysisPlatform &platform,
                                        const std::vector<TaskId> &suspects) {
   if (workload.task_count() > kMostTasksForRemedy) return std::nullopt;
-  return Search(workload, platform).run(suspects);
+  return RemedySearch(workload, platform).run(suspects);
 }
 
 }  // namespace redag::lab

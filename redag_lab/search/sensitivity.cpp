@@ -68,9 +68,9 @@ std::string obstacle_of(const Workload &workload, const analysis::AnalysisPlatfo
 }
 
 // Searches the positions of one knob.
-class Search {
+class SensitivitySearch {
  public:
-  Search(const Workload &workload, const analysis::AnalysisPlatform &platform, const Knob &knob, const Accepts &accepts,
+  SensitivitySearch(const Workload &workload, const analysis::AnalysisPlatform &platform, const Knob &knob, const Accepts &accepts,
          const SensitivityOptions &options)
       : workload_(workload), platform_(platform), accepts_(accepts), options_(options) {
     margin_.knob = knob;
@@ -277,7 +277,7 @@ std::optional<std::string> why_impossible(const analysis::TaskSet &task_set) {
 
 std::optional<Margin> margin_of(const Workload &workload, const analysis::AnalysisPlatform &platform, const Knob &knob,
                                 const Accepts &accepts, const SensitivityOptions &options) {
-  return Search(workload, platform, knob, accepts, options).run();
+  return SensitivitySearch(workload, platform, knob, accepts, options).run();
 }
 
 namespace {
