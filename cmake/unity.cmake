@@ -9,21 +9,16 @@
 set(alone
   redag/model/callback_match_test.cpp
   redag/model/demand_test.cpp
-  redag/model/validate.cpp
-  redag/model/workload_yaml.cpp
   redag/model/workload_yaml_mistakes_test.cpp
   redag/runtime/engine_short_jobs_test.cpp
   redag/runtime/executor_options_test.cpp
   redag/runtime/release_thread_test.cpp
-  redag/trace/flight_recorder.cpp
   redag/trace/flight_recorder_test.cpp
   redag/trace/output_file_test.cpp
   redag_analysis/analyze/examples_test.cpp
   redag_analysis/core/waiting_test.cpp
   redag_analysis/many_workers/dag_shapes_test.cpp
   redag_analysis/many_workers/global_dag_test.cpp
-  redag_analysis/many_workers/global_edf.cpp
-  redag_analysis/many_workers/global_sequential.cpp
   redag_analysis/many_workers/global_sequential_test.cpp
   redag_analysis/many_workers/suspension_aware_test.cpp
   redag_analysis/metrics/deadline_watch_test.cpp
@@ -31,50 +26,20 @@ set(alone
   redag_analysis/metrics/perfetto_test.cpp
   redag_analysis/metrics/summary_test.cpp
   redag_analysis/metrics/trace_checker_test.cpp
-  redag_analysis/one_worker/edf_demand.cpp
   redag_analysis/one_worker/edf_demand_test.cpp
-  redag_analysis/one_worker/exact_points.cpp
   redag_analysis/one_worker/exact_points_test.cpp
-  redag_analysis/one_worker/linear_bound.cpp
   redag_analysis/one_worker/paper_test.cpp
   redag_analysis/one_worker/response_time_test.cpp
-  redag_analysis/one_worker/utilization.cpp
   redag_analysis/one_worker/utilization_test.cpp
   redag_analysis/sim/waits_test.cpp
   redag_lab/cli/analyze/analysis_report.cpp
   redag_lab/cli/analyze/analysis_report_test.cpp
-  redag_lab/cli/analyze/analyze_command.cpp
-  redag_lab/cli/analyze/assign_command.cpp
-  redag_lab/cli/analyze/diff_command.cpp
-  redag_lab/cli/analyze/sensitivity_command.cpp
-  redag_lab/cli/analyze/tune_command.cpp
   redag_lab/cli/analyze/tuning_report.cpp
-  redag_lab/cli/experiment/report_command.cpp
-  redag_lab/cli/robot/arrange_command.cpp
-  redag_lab/cli/robot/arrange_report.cpp
-  redag_lab/cli/run/calibrate_command.cpp
-  redag_lab/cli/run/check_trace_command.cpp
-  redag_lab/cli/run/compare_command.cpp
-  redag_lab/cli/run/generate_command.cpp
-  redag_lab/cli/run/merge_report.cpp
-  redag_lab/cli/run/merge_traces_command.cpp
-  redag_lab/cli/run/recover_command.cpp
-  redag_lab/cli/run/run_report.cpp
-  redag_lab/cli/run/validate_command.cpp
-  redag_lab/cli/serve/live_server.cpp
-  redag_lab/cli/serve/serve_command.cpp
-  redag_lab/cli/terminal/screen.cpp
-  redag_lab/cli/terminal/workload_input.cpp
-  redag_lab/cli/top/top_command.cpp
-  redag_lab/experiment/factorial_plan.cpp
+  redag_lab/cli/run/why_report.cpp
   redag_lab/experiment/factorial_plan_test.cpp
-  redag_lab/experiment/factorial_plan_yaml.cpp
   redag_lab/experiment/factorial_test.cpp
-  redag_lab/experiment/observation.cpp
   redag_lab/report/schedule_test.cpp
   redag_lab/run/difference_test.cpp
-  redag_lab/search/remedy.cpp
-  redag_lab/search/sensitivity.cpp
   redag_testing/conformance_test.cpp
   redag_testing/differential_test.cpp
   redag_testing/kernel_judge.cpp

@@ -33,12 +33,12 @@ struct NamedText {
   std::string Provenance::*value;
 };
 constexpr std::array<NamedText, 7> kNamedTexts = {{{"created", &Provenance::created},
-                                           {"version", &Provenance::version},
-                                           {"revision", &Provenance::revision},
-                                           {"host", &Provenance::host},
-                                           {"kernel", &Provenance::kernel},
-                                           {"command", &Provenance::command},
-                                           {"calibration", &Provenance::calibration}}};
+                                                   {"version", &Provenance::version},
+                                                   {"revision", &Provenance::revision},
+                                                   {"host", &Provenance::host},
+                                                   {"kernel", &Provenance::kernel},
+                                                   {"command", &Provenance::command},
+                                                   {"calibration", &Provenance::calibration}}};
 
 class StatedCalibration {
  public:
@@ -157,7 +157,8 @@ Result<Provenance> provenance_from_json(std::string_view text) {
 
 std::string provenance_to_comment(const Provenance &provenance) {
   std::string text;
-  for (const NamedText &field : kNamedTexts) text += fmt::format("# {}: {}\n", field.name, as_json(provenance.*field.value));
+  for (const NamedText &field : kNamedTexts)
+    text += fmt::format("# {}: {}\n", field.name, as_json(provenance.*field.value));
   return text;
 }
 

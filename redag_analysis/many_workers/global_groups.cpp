@@ -300,7 +300,8 @@ Outcome apply_groups(const TaskSet &task_set) {
   if (task_set.platform.preempt_overhead > 0 && task_set.platform.workers == 1) {
     return NotApplicable{"groups cannot be combined with an overhead of preemption on one worker"};
   }
-  return is_across_rates(task_set) ? across_rates(task_set, apply_units) : apply_within_groups(task_set, Beyond::Allowed);
+  return is_across_rates(task_set) ? across_rates(task_set, apply_units)
+                                   : apply_within_groups(task_set, Beyond::Allowed);
 }
 
 }  // namespace

@@ -188,8 +188,9 @@ Outcome apply_recurrence(const TaskSet &task_set, bool with_blocking) {
 Outcome apply_rta(const TaskSet &task_set) { return apply_recurrence(task_set, false); }
 Outcome apply_rta_blocking(const TaskSet &task_set) { return apply_recurrence(task_set, true); }
 
-Method make_paper_method(std::string_view name, Subject subject, std::string_view equation, std::string_view sound_only_if,
-            std::string_view complexity, Outcome (*apply)(const TaskSet &)) {
+Method make_paper_method(std::string_view name, Subject subject, std::string_view equation,
+                         std::string_view sound_only_if, std::string_view complexity,
+                         Outcome (*apply)(const TaskSet &)) {
   return Method{
       .name = name,
       .subject = subject,
@@ -204,28 +205,31 @@ Method make_paper_method(std::string_view name, Subject subject, std::string_vie
 }  // namespace
 
 Method paper_rm_bound() {
-  return make_paper_method("paper_rm_bound", Subject::TaskSet, "ReDAG-RT, eq. rm_bound",
-              "one worker, full preemption, rate-monotonic order, D >= T, no jitter, no blocking; DAGs of one rate",
-              "O(n)", apply_rm_bound);
+  return make_paper_method(
+      "paper_rm_bound", Subject::TaskSet, "ReDAG-RT, eq. rm_bound",
+      "one worker, full preemption, rate-monotonic order, D >= T, no jitter, no blocking; DAGs of one rate", "O(n)",
+      apply_rm_bound);
 }
 
 Method paper_interference() {
-  return make_paper_method("paper_interference", Subject::Task, "ReDAG-RT, eq. interference",
-              "one worker, full preemption, rate_monotonic, different periods, no edges, jitter or blocking, and no "
-              "more urgent task is released again before the task ends",
-              "O(n) per task", apply_interference);
+  return make_paper_method(
+      "paper_interference", Subject::Task, "ReDAG-RT, eq. interference",
+      "one worker, full preemption, rate_monotonic, different periods, no edges, jitter or blocking, and no "
+      "more urgent task is released again before the task ends",
+      "O(n) per task", apply_interference);
 }
 
 Method paper_rta() {
-  return make_paper_method("paper_rta", Subject::Task, "ReDAG-RT, eqs. rta and rta_convergence",
-              "one worker, full preemption, rate_monotonic, different periods, no edges, jitter or blocking; R <= T",
-              "pseudo-polynomial; O(n) per step", apply_rta);
+  return make_paper_method(
+      "paper_rta", Subject::Task, "ReDAG-RT, eqs. rta and rta_convergence",
+      "one worker, full preemption, rate_monotonic, different periods, no edges, jitter or blocking; R <= T",
+      "pseudo-polynomial; O(n) per step", apply_rta);
 }
 
 Method paper_rta_blocking() {
   return make_paper_method("paper_rta_blocking", Subject::Task, "ReDAG-RT, eq. rta_blocking; B_i as on one worker",
-              "one worker, rate_monotonic, different periods, no edges or jitter; R <= T",
-              "pseudo-polynomial; O(n) per step", apply_rta_blocking);
+                           "one worker, rate_monotonic, different periods, no edges or jitter; R <= T",
+                           "pseudo-polynomial; O(n) per step", apply_rta_blocking);
 }
 
 }  // namespace redag::analysis

@@ -22,11 +22,14 @@ constexpr Int128 kUtilizationUnit = Int128{1} << 60;  // utilizations in units o
 
 Int128 rounded(const ShareRange &range) { return static_cast<Int128>(range.low); }
 
-double utilization_as_double(Int128 value) { return static_cast<double>(value) / static_cast<double>(kUtilizationUnit); }
+double utilization_as_double(Int128 value) {
+  return static_cast<double>(value) / static_cast<double>(kUtilizationUnit);
+}
 
 std::string figures(const char *name, Int128 value, Int128 limit) {
   char text[96];
-  std::snprintf(text, sizeof text, "%s = %.4f, limit %.4f", name, utilization_as_double(value), utilization_as_double(limit));
+  std::snprintf(text, sizeof text, "%s = %.4f, limit %.4f", name, utilization_as_double(value),
+                utilization_as_double(limit));
   return text;
 }
 
@@ -122,7 +125,8 @@ Outcome apply_hyperbolic(const TaskSet &task_set) {
   Prepared prepared;
   if (auto reason = prepare(task_set, false, prepared)) return NotApplicable{*reason};
   const Shares shares = shares_of(task_set);
-  return answer(is_within_hyperbolic(shares), figures("prod (U_i + 1)", rounded(shares.product()), 2 * kUtilizationUnit));
+  return answer(is_within_hyperbolic(shares),
+                figures("prod (U_i + 1)", rounded(shares.product()), 2 * kUtilizationUnit));
 }
 
 // A maximum matching between periods and their multiples (Kuhn); each unmatched period starts a chain. Units of one
@@ -264,7 +268,8 @@ Outcome apply_global_rm_light(const TaskSet &task_set) {
   const Shares most = largest(shares);
   const bool fits = is_sum_within(shares, m * m, 3 * m - 2) && is_sum_within(most, m, 3 * m - 2);
   const auto divisor = static_cast<Int128>(3 * m - 2);
-  return answer(fits, figures("U", rounded(shares.sum()), static_cast<Int128>(m * m) * kUtilizationUnit / divisor) + "; " +
+  return answer(fits, figures("U", rounded(shares.sum()), static_cast<Int128>(m * m) * kUtilizationUnit / divisor) +
+                          "; " +
                           figures("max U_i", rounded(most.sum()), static_cast<Int128>(m) * kUtilizationUnit / divisor));
 }
 
@@ -276,7 +281,8 @@ Outcome apply_global_rm_utilization(const TaskSet &task_set) {
   Shares weighted;  // 2 U + (m - 2) u <= m
   for (const Share &share : shares.all()) weighted.push({share.amount * 2, share.period});
   for (const Share &share : most.all()) weighted.push({share.amount * (m - 2), share.period});
-  const Int128 limit = (static_cast<Int128>(m) * (kUtilizationUnit - rounded(most.sum())) + 2 * rounded(most.sum())) / 2;
+  const Int128 limit =
+      (static_cast<Int128>(m) * (kUtilizationUnit - rounded(most.sum())) + 2 * rounded(most.sum())) / 2;
   return answer(is_sum_within(most, 1, 1) && is_sum_within(weighted, m, 1), figures("U", rounded(shares.sum()), limit));
 }
 

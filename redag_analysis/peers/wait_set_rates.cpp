@@ -280,8 +280,8 @@ constexpr std::string_view kOneThread =
     "rclcpp's SingleThreadedExecutor of Humble with a processor of its own, timers polled like subscriptions; one rate "
     "per DAG with edges, J + R <= T for all tasks; release jitter; no shared exclusive groups";
 
-Method make_wait_set_method(std::string_view name, std::string_view cite, std::string_view assumptions, std::string_view complexity,
-            Outcome (*apply)(const TaskSet &)) {
+Method make_wait_set_method(std::string_view name, std::string_view cite, std::string_view assumptions,
+                            std::string_view complexity, Outcome (*apply)(const TaskSet &)) {
   return Method{
       .name = name,
       .subject = Subject::Dag,
@@ -295,17 +295,19 @@ Method make_wait_set_method(std::string_view name, std::string_view cite, std::s
 }  // namespace
 
 Method casini() {
-  return make_wait_set_method("casini",
-              "D. Casini, T. Blass, I. Luetkebohle, B. Brandenburg, Response-time analysis of ROS 2 processing chains "
-              "under reservation-based scheduling, ECRTS 2019",
-              kOneThread, "O(tasks^2) per round, at most 1000 rounds", apply_casini);
+  return make_wait_set_method(
+      "casini",
+      "D. Casini, T. Blass, I. Luetkebohle, B. Brandenburg, Response-time analysis of ROS 2 processing chains "
+      "under reservation-based scheduling, ECRTS 2019",
+      kOneThread, "O(tasks^2) per round, at most 1000 rounds", apply_casini);
 }
 
 Method blass() {
-  return make_wait_set_method("blass",
-              "T. Blass, D. Casini, S. Bozhko, B. Brandenburg, A ROS 2 response-time analysis exploiting starvation "
-              "freedom and execution-time variance, RTSS 2021 (theorem 2, without execution-time curves)",
-              kOneThread, "pseudo-polynomial; O(tasks^2) per step, at most 1000 rounds", apply_blass);
+  return make_wait_set_method(
+      "blass",
+      "T. Blass, D. Casini, S. Bozhko, B. Brandenburg, A ROS 2 response-time analysis exploiting starvation "
+      "freedom and execution-time variance, RTSS 2021 (theorem 2, without execution-time curves)",
+      kOneThread, "pseudo-polynomial; O(tasks^2) per step, at most 1000 rounds", apply_blass);
 }
 
 Method wait_set_rates() {

@@ -37,7 +37,8 @@ class FactorialReader : private PlanReader {
 
   Result<FactorialPlan> run() {
     return read_plan(
-        root_, "factorial", kFactorialKeys, plan_, [this] { read(); }, [this] { return find_mistakes(plan_, executors_); });
+        root_, "factorial", kFactorialKeys, plan_, [this] { read(); },
+        [this] { return find_mistakes(plan_, executors_); });
   }
 
  private:

@@ -70,8 +70,8 @@ std::string obstacle_of(const Workload &workload, const analysis::AnalysisPlatfo
 // Searches the positions of one knob.
 class SensitivitySearch {
  public:
-  SensitivitySearch(const Workload &workload, const analysis::AnalysisPlatform &platform, const Knob &knob, const Accepts &accepts,
-         const SensitivityOptions &options)
+  SensitivitySearch(const Workload &workload, const analysis::AnalysisPlatform &platform, const Knob &knob,
+                    const Accepts &accepts, const SensitivityOptions &options)
       : workload_(workload), platform_(platform), accepts_(accepts), options_(options) {
     margin_.knob = knob;
     margin_.nominal = nominal_position(workload, knob);

@@ -30,7 +30,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct ReportOptions {
+struct ReportArguments {
   std::vector<std::string> places;
   std::string output;
   bool json = false;
@@ -38,7 +38,7 @@ struct ReportOptions {
 
 class Reporting {
  public:
-  Reporting(const ReportOptions &options, Console &console)
+  Reporting(const ReportArguments &options, Console &console)
       : options_(options), console_(console), progress_(console) {}
 
   int run() {
@@ -163,7 +163,7 @@ class Reporting {
     return ((fs::is_directory(first, ignored) ? first : first.parent_path()) / "report.html").string();
   }
 
-  const ReportOptions &options_;
+  const ReportArguments &options_;
   Console &console_;
   Progress progress_;
   std::vector<report::Group> groups_;
@@ -171,7 +171,7 @@ class Reporting {
 };
 
 // Writes the page of an experiment's folder, and says what it shows.
-int write_page(const ReportOptions &options, const fs::path &folder, const std::string &summary,
+int write_page(const ReportArguments &options, const fs::path &folder, const std::string &summary,
                const std::string &html, Console &console) {
   const std::string path = options.output.empty() ? (folder / "report.html").string() : options.output;
   if (const Result<void> written = write_text(path, html); !written) {
@@ -191,7 +191,7 @@ int write_page(const ReportOptions &options, const fs::path &folder, const std::
 }
 
 // Reports the folder of a factorial experiment, which becomes one page.
-int report_factorial(const ReportOptions &options, const fs::path &file, Console &console) {
+int report_factorial(const ReportArguments &options, const fs::path &file, Console &console) {
   const Result<std::string> text = trace::read_file(file.string());
   if (!text) {
     console.note(text.error());
@@ -212,7 +212,7 @@ int report_factorial(const ReportOptions &options, const fs::path &file, Console
 }
 
 // Reports the folder of an acceptance experiment. Counts its units one by one, also those of a run that was killed.
-int report_acceptance(const ReportOptions &options, const std::string &folder, Console &console) {
+int report_acceptance(const ReportArguments &options, const std::string &folder, Console &console) {
   const auto refuse = [&console](const Diagnostics &mistakes) {
     console.note(mistakes);
     return kExitBad;
@@ -236,7 +236,7 @@ int report_acceptance(const ReportOptions &options, const std::string &folder, C
   return write_page(options, folder, summary, acceptance_page(acceptance, counter.results(), runs), console);
 }
 
-int make_report(const ReportOptions &options, Console &console) {
+int make_report(const ReportArguments &options, Console &console) {
   for (const std::string &place : options.places) {
     std::error_code ignored;
     const fs::path factorial = fs::path(place) / "factorial.json";
@@ -254,7 +254,7 @@ int make_report(const ReportOptions &options, Console &console) {
 }  // namespace
 
 Action add_report(CLI::App &app) {
-  auto options = std::make_shared<ReportOptions>();
+  auto options = std::make_shared<ReportArguments>();
   app.add_option("DIR", options->places,
                  "Folders of recorded runs (--out of run, simulate, compare), at any depth; or one folder of 'redag "
                  "experiment'")

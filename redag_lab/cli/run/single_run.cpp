@@ -13,7 +13,7 @@
 namespace redag::cli {
 namespace {
 
-constexpr Duration kThreadsDuration = 10 * kSecond;
+constexpr Duration kSingleRunDuration = 10 * kSecond;
 
 Result<lab::Session> run_interruptibly(const Workload &workload, const lab::Variant &variant,
                                        lab::SessionOptions options, Console &console) {
@@ -47,7 +47,7 @@ int run_once(const RunArguments &arguments, const std::string &executor, trace::
     console.note(configured.error());
     return kExitBad;
   }
-  const Duration usual = simulated ? lab::sensible_duration(*workload) : kThreadsDuration;
+  const Duration usual = simulated ? lab::sensible_duration(*workload) : kSingleRunDuration;
   std::optional<lab::SessionOptions> options = session_options(arguments, driver, usual, console);
   if (!options) return kExitBad;
   options->files = files_options(arguments, arguments.folder);

@@ -19,13 +19,13 @@ namespace {
 
 constexpr std::uint32_t kPort = 8642;
 
-struct ServeOptions {
+struct ServeArguments {
   std::uint32_t port = kPort;
   Duration interval = kSecond;
   std::string folder = live::kFolder;
 };
 
-int serve(const ServeOptions &options, Console &console) {
+int serve(const ServeArguments &options, Console &console) {
   const InterruptGuard guard;
   const Result<std::string> token = make_token();
   if (!token) {
@@ -56,7 +56,7 @@ int serve(const ServeOptions &options, Console &console) {
 }  // namespace
 
 Action add_serve(CLI::App &app) {
-  auto options = std::make_shared<ServeOptions>();
+  auto options = std::make_shared<ServeArguments>();
   add_count(app, "--port", options->port, Range<std::uint32_t>{0, 65535}, "Port on 127.0.0.1; 0: a free one");
   add_duration(app, "--interval", options->interval, "Time between two updates");
   add_pages_folder(app, options->folder);

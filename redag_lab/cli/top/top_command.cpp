@@ -22,7 +22,7 @@
 namespace redag::cli {
 namespace {
 
-struct TopOptions {
+struct TopArguments {
   std::string target;
   std::string folder = live::kFolder;
   Duration interval = kSecond;
@@ -37,7 +37,7 @@ struct TopOptions {
 constexpr const char *kHowTo =
     "'redag run' publishes one by default; programs set ExecutorOptions::live, and ROS 2 nodes the parameter 'live'";
 
-int list(const TopOptions &options, Console &console) {
+int list(const TopArguments &options, Console &console) {
   const std::vector<live::Listed> pages = live::list_pages(options.folder);
   const Time now = runtime::monotonic_now();
   if (options.json) {
@@ -50,7 +50,7 @@ int list(const TopOptions &options, Console &console) {
   return kExitNo;
 }
 
-int show_once(const TopOptions &options, const std::optional<LiveTarget> &target, Console &console) {
+int show_once(const TopArguments &options, const std::optional<LiveTarget> &target, Console &console) {
   std::vector<live::Listed> pages = live::list_pages(options.folder);
   std::erase_if(pages, [&](const live::Listed &listed) { return target && !target->names(listed); });
   const Time now = runtime::monotonic_now();
@@ -88,7 +88,7 @@ int show_once(const TopOptions &options, const std::optional<LiveTarget> &target
   return kExitOk;
 }
 
-int show_all(const TopOptions &options, Console &console) {
+int show_all(const TopArguments &options, Console &console) {
   const StreamTraits &out = console.out_traits();
   if (!options.once && !options.json && Screen::is_possible()) {
     return watch_machine({.folder = options.folder,
@@ -112,7 +112,7 @@ int show_all(const TopOptions &options, Console &console) {
   return kExitNo;
 }
 
-int top(const TopOptions &options, Console &console) {
+int top(const TopArguments &options, Console &console) {
   std::optional<LiveTarget> target;
   if (!options.target.empty()) {
     target = parse_target(options.target);
@@ -137,13 +137,13 @@ int top(const TopOptions &options, Console &console) {
                             .colour = console.out_traits().colour});
 }
 
-constexpr std::array kOrders{LiveOrder::Dag,     LiveOrder::Name,   LiveOrder::Rate, LiveOrder::P99,
-                             LiveOrder::Longest, LiveOrder::Misses, LiveOrder::Cpu};
+constexpr std::array kSortOrders{LiveOrder::Dag,     LiveOrder::Name,   LiveOrder::Rate, LiveOrder::P99,
+                                 LiveOrder::Longest, LiveOrder::Misses, LiveOrder::Cpu};
 
 }  // namespace
 
 Action add_top(CLI::App &app) {
-  auto options = std::make_shared<TopOptions>();
+  auto options = std::make_shared<TopArguments>();
   LiveView &view = options->view;
   CLI::Option *target = app.add_option("PID", options->target,
                                        "Process ID; by default the only running executor, or a list to choose from");
@@ -155,7 +155,7 @@ Action add_top(CLI::App &app) {
   app.add_flag("--once", options->once, "Print one frame as text and exit")->excludes(list);
   app.add_flag("--json", options->json, "Print one frame (or the list) as a JSON document and exit");
   add_duration(app, "--interval", options->interval, "Time between two updates");
-  add_choice(app, "--sort", view.order, choices_of(kOrders), "Order of the rows")->excludes(all);
+  add_choice(app, "--sort", view.order, choices_of(kSortOrders), "Order of the rows")->excludes(all);
   app.add_flag("--reverse", view.reversed, "Reverse the order");
   app.add_option("--filter", view.filter, "Show only DAGs and tasks whose name contains this")->type_name("TEXT");
   app.add_flag("--dags", view.dags_only, "Show only DAGs, not their tasks")->excludes(all);
