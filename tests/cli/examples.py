@@ -142,10 +142,9 @@ class Examples(Case):
             if "--" not in example or "--interval" in example:  # a screen, until it is interrupted
                 example = example.replace("redag top", f"redag top {pid}") if example == "redag top" else example
                 example = f"script --quiet --return --command 'timeout --foreground --preserve-status -s INT 2 {example}' /dev/null"
-        if name in ("serve", "export"):
+        if name == "serve":  # until it is interrupted
             self.running_executor()
-            if "--once" not in example:  # serves until it is interrupted
-                example = f"timeout --preserve-status -s INT 2 {example}"
+            example = f"timeout --preserve-status -s INT 2 {example}"
         return example
 
     def lacking(self, command, example):
@@ -155,8 +154,6 @@ class Examples(Case):
             return "no right to use SCHED_FIFO"
         if "--affinity" in example and len(os.sched_getaffinity(0)) < 2:
             return "two processors are needed"
-        if "--prometheus" in example and "without Prometheus" in redag("export", "--prometheus", "--once").stderr:
-            return "this redag was built without Prometheus"
         for tool in ("jq", "man", "script"):
             if re.search(rf"(?:\| |^){tool} ", example) and not shutil.which(tool):
                 return f"{tool} is not installed"

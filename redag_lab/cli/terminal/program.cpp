@@ -122,13 +122,9 @@ constexpr std::array kCommands = {
           "  redag top --all --once\n"
           "  redag top 1234 --interval 500ms --sort misses\n"
           "  redag top 1234 --once --json\n"},
-    Entry{"serve", "Show the running executors in a browser of this machine", add_serve,
+    Entry{"serve", "Show the running executors in a browser, or to Prometheus", add_serve,
           "  redag serve\n"
           "  redag serve --port 0 --interval 500ms\n"},
-    Entry{"export", "Serve the figures of running executors to Prometheus", add_export,
-          "  redag export --prometheus\n"
-          "  redag export --prometheus --listen 127.0.0.1:9000\n"
-          "  redag export --prometheus --once | grep misses\n"},
     Entry{"completion", "Write what a shell needs to complete commands, options and files", add_completion,
           "  source <(redag completion bash)\n"
           "  redag completion zsh --output _redag\n"
