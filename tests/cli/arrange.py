@@ -221,20 +221,6 @@ dags:
             result = self.expect(redag("arrange", EXAMPLE, "--rtprio", "90", "--levels", process), 2)
             self.assertIn(hint, result.stderr)
 
-    def test_each_host_has_its_own_order(self):
-        file = SOURCE / "examples" / "hosts" / "robot.yaml"
-        for host, levels in (("vision", [["vision.camera.grab", "vision.camera.detect"]]),
-                             ("drive", [["drive.control.pid"], ["drive.avoid.obstacles", "drive.avoid.brake"]])):
-            plan = json.loads(self.expect(redag("arrange", file, "--rtprio", "90", "--json", "--host", host), 0).stdout)
-            self.assertEqual([level["members"] for level in plan["levels"]], levels)
-            self.assertEqual([level["priority"] for level in plan["levels"]], [80, 79][:len(levels)])
-        self.assertEqual(self.expect(redag("arrange", file, "--rtprio", "90", "--levels", "vision"), 0).stdout, "80\n")
-        self.assertEqual(self.expect(redag("arrange", file, "--rtprio", "90", "--levels", "drive"), 0).stdout, "80,79\n")
-        self.expect(redag("arrange", file), 2, "has several hosts, and this machine", "--host vision, --host drive")
-        self.expect(redag("arrange", file, "--host", "dirve"), 2, "there is no host 'dirve'", "did you mean 'drive'?")
-        self.expect(redag("arrange", file, "--levels", "dirve"), 2, "there is no process 'dirve'", "did you mean 'drive'?")
-        self.expect(redag("arrange", EXAMPLE, "--host", "drive"), 2, "has no hosts")
-
     # --- real threads ---
 
     @unittest.skipUnless(may_use_fifo(), "this user may not use SCHED_FIFO")

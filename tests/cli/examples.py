@@ -31,8 +31,6 @@ RESULTS = {
     "results/os": [*ROBOT[:3], "cooperative", *ROBOT[4:]],
     "results/after": [*ROBOT, "--seed", "2"], "results/branch": [*ROBOT, "--seed", "3"],
     "results/cmp": ["compare", "workloads/robot.yaml", "--simulate", "--executors", "redag,mte", "--duration", "2s"],
-    "results/vision": ["simulate", "examples/hosts/vision.yaml", "--duration", "2s"],
-    "results/drive": ["simulate", "examples/hosts/drive.yaml", "--duration", "2s"],
     "results/dags-1": ["experiment", "acceptance", "experiments/acceptance_dags.yaml", "--shard", "1/2"],
     "results/dags-2": ["experiment", "acceptance", "experiments/acceptance_dags.yaml", "--shard", "2/2"],
 }

@@ -28,16 +28,11 @@ void robot_target(std::string_view input) {
   } else {
     REDAG_CHECK(!read->workload.error().empty(), "a refusal says why");
   }
-  std::vector<robot::Robot> parts;
-  for (std::size_t host = 0; host < read->robot->hosts.size(); ++host) parts.push_back(part_of(*read->robot, host));
-  if (parts.empty()) parts.push_back(*std::move(read->robot));
-  for (const robot::Robot &part : parts) {
-    for (const int limit : {3, 90}) {
-      const Result<robot::Plan> plan = robot::plan_of(part, runtime::band_up_to(limit));
-      if (!plan) continue;
-      REDAG_CHECK(plan->of_threads.size() == part.threads.size(), "each entry has its level");
-      (void)robot::changes_of(part, *plan, {});
-    }
+  for (const int limit : {3, 90}) {
+    const Result<robot::Plan> plan = robot::plan_of(*read->robot, runtime::band_up_to(limit));
+    if (!plan) continue;
+    REDAG_CHECK(plan->of_threads.size() == read->robot->threads.size(), "each entry has its level");
+    (void)robot::changes_of(*read->robot, *plan, {});
   }
 }
 

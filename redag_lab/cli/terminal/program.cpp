@@ -101,13 +101,6 @@ constexpr std::array kCommands = {
     Entry{"recover", "Recover the results of a run that was killed", add_recover,
           "  redag recover results/os\n"
           "  redag recover results/os --out results/rescued --keep\n"},
-    Entry{"merge-traces", "Merge the results of several hosts into one, on one clock", add_merge_traces,
-          "  redag merge-traces --host vision=results/vision --host drive=results/drive \\\n"
-          "    --offset vision=0 --offset drive=1.25ms+-80us --out results/robot\n"
-          "  redag merge-traces --host vision=results/vision --host drive=results/drive \\\n"
-          "    --clock vision=examples/hosts/vision.txt \\\n"
-          "    --clock drive=examples/hosts/drive.txt \\\n"
-          "    --robot examples/hosts/robot.yaml --out results/robot\n"},
     Entry{"why", "Explain why deadlines of a recorded run were missed", add_why,
           "  redag why results/demo\n"
           "  redag why results/demo control.controller\n"
