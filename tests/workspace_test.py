@@ -55,8 +55,8 @@ OPTIONAL = {"redag_rclcpp": {"cm_executors"},
             "redag_rclcpp_lab": {"autoware_reference_system", "cm_executors", "reference_interfaces", "reference_system",
                                  "image_proc", "ament_index_cpp", "composition_interfaces", "rclcpp_components",
                                  "controller_interface", "controller_manager", "controller_manager_msgs",
-                                 "hardware_interface", "pluginlib", "sensor_msgs", "callback_isolated_executor",
-                                 "cie_thread_configurator", "geometry_msgs", "nav2_controller", "nav2_msgs", "nav_msgs",
+                                 "hardware_interface", "pluginlib", "sensor_msgs",
+                                 "geometry_msgs", "nav2_controller", "nav2_msgs", "nav_msgs",
                                  "rclcpp_action", "rosbag2_transport", "tf2_ros"}}
 # Folders of the repository that a package uses where they are there, and does without elsewhere.
 BESIDE = ("../benchmarks/counted", "../redag_testing")

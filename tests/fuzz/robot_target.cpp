@@ -6,16 +6,12 @@
 
 #include "redag/base/check.hpp"
 #include "redag_lab/robot/changes.hpp"
-#include "redag_lab/robot/cie.hpp"
 #include "redag_lab/robot/input.hpp"
 #include "tests/fuzz/targets.hpp"
 
 namespace redag::fuzz {
 
 void robot_target(std::string_view input) {
-  if (const Result<robot::cie::Imported> imported = robot::cie::import_robot(input, "fuzz.yaml")) {
-    REDAG_CHECK(yaml::parse(imported->text, "robot.yaml").has_value(), "a robot file that was made is YAML");
-  }
   const Result<robot::Input> read = robot::parse_input(input, "fuzz.yaml");
   if (!read) {
     REDAG_CHECK(!read.error().empty(), "a refusal says why");

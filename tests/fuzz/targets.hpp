@@ -13,7 +13,7 @@ namespace redag::fuzz {
 /// Reads workload YAML, for the simulator and for ROS 2 (callbacks, no wcet). An accepted workload must survive being
 /// written.
 void workload_target(std::string_view input);
-/// Reads robots, with their unions and plans, and configurations that become robots.
+/// Reads robots, with their unions and plans.
 void robot_target(std::string_view input);
 /// Reads plans of experiments.
 void plan_target(std::string_view input);

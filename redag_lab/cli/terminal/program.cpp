@@ -84,9 +84,6 @@ constexpr std::array kCommands = {
           "  redag arrange examples/robot/cart.yaml --levels drive\n"
           "  sudo redag arrange examples/robot/cart.yaml --apply\n"
           "  sudo redag arrange examples/robot/cart.yaml --undo\n"},
-    Entry{"import", "Make a robot file of the configuration of callback_isolated_executor", add_import,
-          "  redag import examples/import/callback_groups.yaml\n"
-          "  redag import examples/import/callback_groups.yaml -o robot.yaml\n"},
     Entry{"experiment", "Run experiments over many workloads: seeded, parallel, resumable", add_experiment,
           "  redag experiment acceptance experiments/acceptance_tasks.yaml\n"
           "  redag experiment acceptance --help\n"
