@@ -56,7 +56,6 @@ set(alone
   redag_lab/cli/run/check_trace_command.cpp
   redag_lab/cli/run/compare_command.cpp
   redag_lab/cli/run/generate_command.cpp
-  redag_lab/cli/run/merge_report.cpp
   redag_lab/cli/run/recover_command.cpp
   redag_lab/cli/run/run_report.cpp
   redag_lab/cli/run/validate_command.cpp
