@@ -16,10 +16,6 @@ find_package(TBB REQUIRED)
 find_package(Threads REQUIRED)
 find_package(tl-expected REQUIRED)
 find_package(ZLIB REQUIRED)
-# For an option of redag_lab/.
-if(REDAG_PROMETHEUS)
-  find_package(prometheus-cpp REQUIRED)
-endif()
 
 if(REDAG_BUILD_TESTS)
   list(APPEND CMAKE_MODULE_PATH ${CMAKE_CURRENT_LIST_DIR})

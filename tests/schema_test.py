@@ -220,7 +220,7 @@ class SchemaTest(unittest.TestCase):
 
     def test_robots(self):
         jsonschema.Draft7Validator.check_schema(ROBOT_SCHEMA)
-        files = [ROOT / "examples" / name for name in ("robot/cart.yaml", "robot/brake.yaml", "robot/arm.yaml", "hosts/robot.yaml")]
+        files = [ROOT / "examples" / name for name in ("robot/cart.yaml", "robot/brake.yaml", "robot/arm.yaml")]
         texts = [file.read_text(encoding="utf-8") for file in files]
         page = (ROOT / "docs" / "robot.md").read_text(encoding="utf-8")
         blocks = [part.split("```")[0] for part in page.split("```yaml")[1:]]
@@ -228,14 +228,6 @@ class SchemaTest(unittest.TestCase):
         self.assertGreater(len(texts), len(files))
         for text in [*texts, ROBOT]:
             self.assertEqual(robot_errors(yaml.safe_load(text)), [], text)
-
-    def test_robots_of_several_hosts(self):
-        document = yaml.safe_load((ROOT / "examples" / "hosts" / "robot.yaml").read_text(encoding="utf-8"))
-        document["hosts"][0] = {"name": "vision", "cpu_sets": [{"name": "all", "cpus": "0-3"}]}
-        document["irqs"] = [{"name": "i", "match": "eth*", "host": "drive", "cpus": "0"}]
-        self.assertEqual(robot_errors(document), [])
-        for host in ({"name": "h"}, {"cpus": 0}, {"name": "h", "cpus": 0, "cpu_sets": [{"name": "all", "cpus": 0}]}):
-            self.assertTrue(robot_errors({**document, "hosts": [host]}), host)
 
     def test_refuses_bad_robots(self):
         for level in ("above", "below", {"rate": "5ms"}, {"fifo": 80}, {"nice": -20}):

@@ -42,21 +42,21 @@ ROS_KEYS = {"ament_cmake", "ament_index_python", "composition_interfaces", "diag
             "ros2cli", "rosbag2_compression", "rosbag2_compression_zstd", "rosbag2_cpp", "rosbag2_storage",
             "rosbag2_storage_default_plugins", "rosgraph_msgs", "std_msgs", "std_srvs", "test_msgs", "tracetools"}
 # Names that find_package() looks for, with the rosdep key that installs them. The C library has the threads,
-# and packages are built without MPI, Prometheus and LTTng.
+# and packages are built without MPI and LTTng.
 CMAKE_PACKAGES = {"fmt": "fmt", "nlohmann_json": "nlohmann-json-dev", "tl-expected": "libexpected-dev",
                   "CLI11": "cli11", "TBB": "tbb", "GTest": "libgtest-dev", "LibYAML": "libyaml-dev", "ZLIB": "zlib",
                   "SQLite3": "libsqlite3-dev", "Curses": "libncurses-dev", "PkgConfig": "pkg-config", "MPI": None,
-                  "prometheus-cpp": None, "LttngUst": None, "Threads": None}
+                  "LttngUst": None, "Threads": None}
 # Folders that headers are included from, with the rosdep key that installs them. Others have the name of their package.
 HEADER_FOLDERS = {"fmt": "fmt", "nlohmann": "nlohmann-json-dev", "tl": "libexpected-dev", "CLI": "cli11", "tbb": "tbb",
-                  "oneapi": "tbb", "prometheus": None, "gtest": "libgtest-dev", "gmock": "libgmock-dev", "arpa": None, "sys": None, "linux": None, "bits": None}
+                  "oneapi": "tbb", "gtest": "libgtest-dev", "gmock": "libgmock-dev", "arpa": None, "sys": None, "linux": None, "bits": None}
 # Peers and stacks for comparisons, which are used where they are installed, and what only these comparisons need.
 OPTIONAL = {"redag_rclcpp": {"cm_executors"},
             "redag_rclcpp_lab": {"autoware_reference_system", "cm_executors", "reference_interfaces", "reference_system",
                                  "image_proc", "ament_index_cpp", "composition_interfaces", "rclcpp_components",
                                  "controller_interface", "controller_manager", "controller_manager_msgs",
-                                 "hardware_interface", "pluginlib", "sensor_msgs", "callback_isolated_executor",
-                                 "cie_thread_configurator", "geometry_msgs", "nav2_controller", "nav2_msgs", "nav_msgs",
+                                 "hardware_interface", "pluginlib", "sensor_msgs",
+                                 "geometry_msgs", "nav2_controller", "nav2_msgs", "nav_msgs",
                                  "rclcpp_action", "rosbag2_transport", "tf2_ros"}}
 # Folders of the repository that a package uses where they are there, and does without elsewhere.
 BESIDE = ("../benchmarks/counted", "../redag_testing")

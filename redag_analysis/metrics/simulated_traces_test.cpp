@@ -40,7 +40,7 @@ RC_GTEST_PROP(SimulatedTraces, KeepEveryRule, ()) {
   RC_ASSERT(report.ok());
 }
 
-// The run of a host whose clock is behind the common one (redag_lab/hosts) begins before time 0.
+// Nothing may depend on where time 0 is: a run can begin before it.
 RC_GTEST_PROP(SimulatedTraces, KeepEveryRuleAtAnyTime, ()) {
   const auto seed = *rc::gen::arbitrary<std::uint64_t>();
   const trace::Trace trace = simulated(drawn(seed), 100 * kMillisecond);

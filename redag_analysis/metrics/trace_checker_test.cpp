@@ -42,7 +42,7 @@ TEST(CheckTrace, AcceptsAGoodRun) {
   }
 }
 
-// As in a merged run of two hosts, of which the second one has a task that its program releases.
+// The program releases the task of the second cluster.
 TEST(CheckTrace, TasksWithoutAGridAreThoseOfTheirCluster) {
   Workload workload = two_tasks();
   workload.platform.workers = 2;

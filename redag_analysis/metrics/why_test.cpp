@@ -383,7 +383,7 @@ TEST(Why, TheKernelsRecordNamesTheOtherProgram) {
             std::string::npos);
 }
 
-// Two hosts in one record: each has a timer, and a thread that the other one's program is not told apart from by name.
+// Each program has a timer, and a thread whose name does not tell the programs apart.
 TEST(Why, TheKernelsRecordOfSeveralProcessesTellsThemApart) {
   const trace::Trace trace = threads_trace(on_threads().at(13).executed("a", 0, 0, 5).finished("a", 0, 0));
   std::vector<KernelRow> rows = kernel_rows(120);

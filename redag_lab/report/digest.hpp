@@ -57,13 +57,6 @@ struct LatestJob {
   std::size_t run = 0;  // the number of its run in the group
 };
 
-/// What a merged run says about its hosts (hosts.json, docs/results_format.md).
-struct HostsPart {
-  std::string document;       // JSON; empty: the run is of one host
-  std::uint64_t missed = 0;   // answers of chains over hosts that certainly missed their deadline
-  std::uint64_t unknown = 0;  // those of which the clocks do not tell
-};
-
 class Group {
  public:
   /// Starts without runs. Call add() before any other function.
@@ -76,8 +69,6 @@ class Group {
                                  const std::optional<metrics::KernelRecord> &kernel = std::nullopt);
   /// True if executor, mode and tasks are those of the group, whose jobs can then be counted together.
   [[nodiscard]] bool fits(const trace::RunInfo &info) const;
-  /// States that the first run is one of several hosts.
-  void set_hosts(HostsPart hosts) { hosts_ = std::move(hosts); }
   /// Sorts, and computes the figures of all runs together. Call it after the last add().
   void finish();
 
@@ -89,7 +80,6 @@ class Group {
   [[nodiscard]] const RunBounds &bounds() const { return bounds_; }
   [[nodiscard]] const Schedule &schedule() const { return schedule_; }
   [[nodiscard]] const WhyDigest &why() const { return why_; }
-  [[nodiscard]] const HostsPart &hosts() const { return hosts_; }
   [[nodiscard]] const Timeline &timeline() const { return timeline_; }
   [[nodiscard]] const std::optional<LatestJob> &latest() const { return latest_; }
 
@@ -121,7 +111,6 @@ class Group {
   Schedule schedule_;
   WhyDigest why_;
   Timeline timeline_;
-  HostsPart hosts_;
   std::vector<metrics::JobStats> task_stats_;
   std::vector<metrics::DagSummary> dags_;
   metrics::JobCounts total_;

@@ -221,10 +221,6 @@ class GroupWriter {
   Json write() const {
     Json verdict = Json::array();
     for (const Sentence &sentence : verdict_of(group_)) verdict.push_back(to_json(sentence));
-    Json hosts = group_.hosts().document.empty() ? Json() : Json::parse(group_.hosts().document);
-    if (!hosts.is_null()) {
-      for (const Json &word : hosts["words"]) verdict.push_back(word);
-    }
     Json runs = Json::array();
     for (const RunDigest &run : group_.runs()) runs.push_back(to_json(run));
     const RunBounds &bounds = group_.bounds();
@@ -243,7 +239,6 @@ class GroupWriter {
                   {"by", bounds.by},
                   {"assumes", bounds.assumes}}},
                 {"runs", std::move(runs)},
-                {"hosts", std::move(hosts)},
                 {"timeline", to_json(group_.timeline())},
                 {"schedule", to_json(group_.schedule(), group_.info())},
                 {"why", Json::parse(report::to_json(group_.why(), group_.workload()))}};

@@ -236,16 +236,6 @@ Sentence headline_of(std::span<const Group> groups) {
   REDAG_CHECK(!groups.empty(), "a headline of nothing");
   if (groups.size() == 1) {
     const metrics::DeadlineVerdict verdict = deadlines_of(groups.front());
-    const HostsPart &hosts = groups.front().hosts();
-    if (hosts.missed > 0) {
-      return {Tone::Bad, fmt::format("Over hosts, {} answers missed their deadlines. On each host: {}",
-                                     format_count(hosts.missed), verdict.headline)};
-    }
-    if (hosts.unknown > 0) {
-      return {tone_of(verdict) == Tone::Bad ? Tone::Bad : Tone::Caution,
-              fmt::format("Over hosts, the clocks leave {} answers open. On each host: {}", format_count(hosts.unknown),
-                          verdict.headline)};
-    }
     return {tone_of(verdict), verdict.headline};
   }
   std::vector<Contender> contenders;

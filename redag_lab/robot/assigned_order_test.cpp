@@ -125,7 +125,7 @@ TEST(AssignedOrder, MergesNeighboursWhereLevelsAreFew) {
 
 TEST(AssignedOrder, CountsOnEachCpuSetForItself) {
   const Input input = input_from(
-      "robot: cart\npolicy: audsley\nhosts: [{name: left, cpus: 0}, {name: right, cpus: 0-1}]\nprocesses:\n"
+      "robot: cart\npolicy: audsley\ncpu_sets: [{name: left, cpus: 0}, {name: right, cpus: 1-2}]\nprocesses:\n"
       "  - {name: a, cpus: left, match: {name: a}, workload: {dags: [" +
       kShort +
       "]}}\n"
@@ -135,11 +135,11 @@ TEST(AssignedOrder, CountsOnEachCpuSetForItself) {
       "  - {name: c, cpus: left, match: {name: c}, workload: {dags: [" +
       kFast +
       "]}}\n"
-      "threads:\n  - {name: x, host: right, match: {thread: x}, level: {rate: 5ms}, wcet: 1ms}\n");
+      "threads:\n  - {name: x, match: {thread: x}, cpus: right, level: {rate: 5ms}, wcet: 1ms}\n");
   ASSERT_TRUE(input.robot->assigned) << to_string(input.workload.error());
   EXPECT_THAT(input.robot->assigned->tests, ElementsAre("rta_preemptive", "guan with deadlines for responses"));
-  EXPECT_EQ(levels_of(part_of(*input.robot, 0)), "a.short.t | c.fast.t");
-  EXPECT_EQ(levels_of(part_of(*input.robot, 1)), "threads x | b.fast.t");
+  EXPECT_EQ(input.robot->assigned->of_task, (std::vector<std::vector<std::uint32_t>>{{0}, {1}, {1}}));
+  EXPECT_EQ(input.robot->assigned->of_threads, std::vector<std::optional<std::uint32_t>>{0});
 }
 
 TEST(AssignedOrder, TakesDataAsLateAsTheDeadlineOfTheirSender) {

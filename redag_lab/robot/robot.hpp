@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A robot (docs/robot.md): the processes of its computers and what else runs there, with a wish for each where it
-// belongs in the order of its computer. Plain values. robot_yaml.hpp reads them, union.hpp makes one workload of them,
+// A robot (docs/robot.md): the processes of a computer and what else runs there, with a wish for each where it
+// belongs in their order. Plain values. robot_yaml.hpp reads them, union.hpp makes one workload of them,
 // and plan.hpp the order.
 #pragma once
 
@@ -28,11 +28,10 @@ struct Place {
   int column = 0;
 };
 
-/// Processors for processes. The sets of a host share none.
+/// Processors for processes. Sets share none.
 struct CpuSet {
   std::string name;       // empty: the only one
   std::vector<int> cpus;  // ascending
-  std::size_t host = 0;   // position in Robot::hosts
 };
 
 /// Which processes an entry means. Patterns for glob_match(); an empty one matches all.
@@ -107,7 +106,6 @@ struct Threads {
   std::string thread;          // pattern of their names; empty: all
   std::optional<Level> level;  // none: they keep what they have
   std::vector<int> cpus;       // empty: they keep theirs
-  std::size_t host = 0;        // position in Robot::hosts
   std::uint32_t count = 1;     // the most of them that there are, each with `wcet` and `period`
   Duration wcet = 0;           // 0: unknown
   Duration period = 0;
@@ -122,7 +120,6 @@ struct Interrupts {
   std::string name;
   std::string match;  // pattern of the number, or of a name in /proc/interrupts
   std::vector<int> cpus;
-  std::size_t host = 0;  // position in Robot::hosts
   Place place;
 };
 
@@ -140,7 +137,6 @@ struct Robot {
   bool by_bounds = false;                 // policy `audsley`: `assigned` is the order, and `policy` has no meaning
   Place policy_place;                     // if by_bounds
   std::optional<AssignedOrder> assigned;  // nothing: not yet known, or there is none
-  std::vector<std::string> hosts;         // their names; empty: one host, which needs none
   std::vector<CpuSet> cpu_sets;           // at least one
   std::vector<Process> processes;
   std::vector<Link> links;
@@ -153,12 +149,6 @@ struct Robot {
 
 /// The policy by which the executor of a process orders its own tasks.
 [[nodiscard]] PolicyKind own_policy(const Robot &robot, std::size_t process);
-
-/// The host of a process, by position in Robot::hosts.
-[[nodiscard]] std::size_t host_of(const Robot &robot, std::size_t process);
-
-/// What runs on one of several hosts: a robot without hosts, called ROBOT/HOST. Links to other hosts are left out.
-[[nodiscard]] Robot part_of(const Robot &robot, std::size_t host);
 
 /// True if threads execute this task, and not the process's own executor.
 [[nodiscard]] bool is_of_threads(const Robot &robot, std::size_t process, TaskId task);

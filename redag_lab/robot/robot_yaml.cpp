@@ -23,8 +23,7 @@ class RobotReader : private ThreadsReader {
   RobotReader(const Node &root, const std::string &file, LoadOptions options) : ThreadsReader(root, file, options) {}
 
   Result<LoadedRobot> run() {
-    if (check_map(root_, "a robot",
-                  {"robot", "policy", "cpus", "cpu_sets", "hosts", "processes", "links", "threads", "irqs"})) {
+    if (check_map(root_, "a robot", {"robot", "policy", "cpus", "cpu_sets", "processes", "links", "threads", "irqs"})) {
       take(root_, "robot", robot_.name, [this](const Node &node, auto key) { return text(node, key); });
       if (const Node *policy = find(root_, "policy")) read_policy(*policy);
       read_cpu_sets();

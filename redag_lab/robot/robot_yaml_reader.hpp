@@ -83,35 +83,25 @@ class EntryReader : protected yaml::ValueReader {
   bool is_broken_ = false;
 };
 
-/// Reads hosts and CPU sets, and what names them.
+/// Reads CPU sets, and what names them.
 class ProcessorsReader : protected EntryReader {
  protected:
   ProcessorsReader(const Node &root, const std::string &file) : EntryReader(file), root_(root) {}
 
-  // The robot is one host, or has several, each with its own processors.
   void read_cpu_sets();
   [[nodiscard]] std::optional<std::size_t> set_named(const Node &node) const;
   [[nodiscard]] std::string names_of_sets() const;
   // Reads the name of a CPU set, or processors.
-  std::vector<int> read_cpus(const Node &node, std::size_t host);
-  // Reads the host of an entry, which `known` tells otherwise.
-  std::size_t read_host_of(const Node &node, const std::string &what, std::optional<std::size_t> known);
+  std::vector<int> read_cpus(const Node &node);
 
   const Node &root_;
   Robot robot_;
-  Names names_of_hosts_;
 
  private:
-  void read_host(const Node &node);
-  // Reads 'cpus', which makes `set` complete, or 'cpu_sets'.
-  void read_processors(const Node &map, const std::string &what, CpuSet set);
-  // The set of a host has the host's name, which is then the name of no other set.
-  bool is_new_set(const Node &at, const std::string &name);
   void read_cpu_set(const Node &node);
 
-  std::size_t host_ = 0;  // whose processors are read
   Names names_of_sets_;
-  std::unordered_set<int> owned_;  // processors of the CPU sets of a host
+  std::unordered_set<int> owned_;  // processors of the CPU sets
 };
 
 /// Reads processes with their workloads, links, and what names these.
@@ -154,8 +144,6 @@ class ThreadsReader : protected ProcessesReader {
   Names names_of_interrupts_;
 
  private:
-  // Threads are on the host of their process, or of the task that they execute.
-  std::size_t host_of_threads(const Node &node, const Threads &threads);
   // A load is what the analysis has to know of threads that interfere with tasks.
   void check_load(const Node &node, Threads &threads);
   std::optional<Level> read_level(const Node &node);

@@ -25,7 +25,7 @@ using yaml::find;
 void ThreadsReader::read_threads(const Node &node) {
   Threads threads;
   threads.place = place_of(node);
-  if (!check_map(node, "an entry of threads", {"name", "match", "host", "level", "cpus", "count", "wcet", "period"}) ||
+  if (!check_map(node, "an entry of threads", {"name", "match", "level", "cpus", "count", "wcet", "period"}) ||
       !take_name(node, "an entry of threads", names_of_threads_, robot_.threads.size(), threads.name)) {
     return;
   }
@@ -36,8 +36,7 @@ void ThreadsReader::read_threads(const Node &node) {
           "add 'match: {thread: NAME}' or 'match: {process: PROCESS, thread: NAME}'");
   }
   if (const Node *level = find(node, "level")) threads.level = read_level(*level);
-  threads.host = host_of_threads(node, threads);
-  if (const Node *cpus_node = find(node, "cpus")) threads.cpus = read_cpus(*cpus_node, threads.host);
+  if (const Node *cpus_node = find(node, "cpus")) threads.cpus = read_cpus(*cpus_node);
   if (find(node, "level") == nullptr && find(node, "cpus") == nullptr) {
     error(node, fmt::format("threads '{}' have neither a level nor cpus", threads.name),
           "add 'level:' or 'cpus:', or remove the entry");
@@ -52,22 +51,6 @@ void ThreadsReader::read_threads(const Node &node) {
           fmt::format("threads '{}' have a reservation, which is for all processors", threads.name), "remove 'cpus:'");
   }
   robot_.threads.push_back(std::move(threads));
-}
-
-std::size_t ThreadsReader::host_of_threads(const Node &node, const Threads &threads) {
-  std::optional<std::size_t> host;
-  if (threads.process && !is_broken_) host = host_of(robot_, *threads.process);
-  if (threads.level && threads.level->kind == Level::Kind::Task && !is_broken_) {
-    const std::size_t of_task = host_of(robot_, threads.level->task.process);
-    if (host && *host != of_task) {
-      error(*find(node, "level"),
-            fmt::format("threads '{}' are on host '{}', and task '{}' is on host '{}'", threads.name,
-                        robot_.hosts[*host], threads.level->task.name, robot_.hosts[of_task]),
-            "choose a task of the same host");
-    }
-    host = of_task;
-  }
-  return read_host_of(node, fmt::format("threads '{}'", threads.name), host);
 }
 
 void ThreadsReader::check_load(const Node &node, Threads &threads) {
@@ -175,7 +158,7 @@ bool ThreadsReader::read_reservation(const Node &node, Reservation &out) {
 void ThreadsReader::read_interrupts(const Node &node) {
   Interrupts interrupts;
   interrupts.place = place_of(node);
-  if (!check_map(node, "an entry of irqs", {"name", "match", "cpus", "host"}) ||
+  if (!check_map(node, "an entry of irqs", {"name", "match", "cpus"}) ||
       !take_name(node, "an entry of irqs", names_of_interrupts_, robot_.interrupts.size(), interrupts.name)) {
     return;
   }
@@ -185,8 +168,7 @@ void ThreadsReader::read_interrupts(const Node &node) {
   }
   take_text(node, "match", interrupts.match);
   if (const Node *cpus_node = find(node, "cpus")) {
-    interrupts.host = read_host_of(node, fmt::format("irqs '{}'", interrupts.name), std::nullopt);
-    interrupts.cpus = read_cpus(*cpus_node, interrupts.host);
+    interrupts.cpus = read_cpus(*cpus_node);
   } else {
     error(node, fmt::format("irqs '{}' have no cpus", interrupts.name), "add 'cpus:'");
   }

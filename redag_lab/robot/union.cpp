@@ -202,7 +202,6 @@ class Union {
     std::vector<std::size_t> met;
     for (std::size_t s = 0; s < robot_.cpu_sets.size(); ++s) {
       const std::vector<int> &cpus = robot_.cpu_sets[s].cpus;
-      if (robot_.cpu_sets[s].host != threads.host) continue;
       const bool meets = threads.cpus.empty() || std::any_of(cpus.begin(), cpus.end(), [&](int cpu) {
                            return std::binary_search(threads.cpus.begin(), threads.cpus.end(), cpu);
                          });
@@ -231,10 +230,7 @@ class Union {
       const CpuSet &set = robot_.cpu_sets[s];
       const auto workers = static_cast<std::uint32_t>(set.cpus.size());
       platform.workers += workers;
-      // Processors of several hosts have no common numbers.
-      if (used.size() > 1) {
-        platform.clusters.push_back(Cluster{set.name, workers, robot_.hosts.empty() ? set.cpus : std::vector<int>{}});
-      }
+      if (used.size() > 1) platform.clusters.push_back(Cluster{set.name, workers, set.cpus});
     }
     if (used.size() == 1) return;
     for (std::size_t d = 0; d < workload_.dags.size(); ++d) {

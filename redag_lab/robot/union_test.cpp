@@ -273,14 +273,6 @@ TEST(RobotUnion, ReservationsComeBeforeAllOthersAndAreBounded) {
             "cart.yaml:30:5: error: 3 threads have reservations, and there are 2 processors: they can delay each "
             "other, which no bound covers (give fewer threads a reservation)");
   robot.threads[1].count = 1;
-  Robot hosts = robot;
-  hosts.hosts = {"a", "b"};
-  hosts.cpu_sets = {CpuSet{"a", {0}, 0}, CpuSet{"b", {0}, 1}};
-  hosts.processes[1].cpu_set = 1;
-  hosts.threads[0] = hosts.threads[1];
-  hosts.threads[0].name = "z";
-  hosts.threads[1].host = 1;
-  EXPECT_EQ(refusal(hosts), "accepted") << "one for the processor of each host";
   robot.cpu_sets = {CpuSet{"a", {0}}, CpuSet{"b", {1}}};
   robot.threads[0].cpus = {0};
   EXPECT_EQ(refusal(robot),

@@ -10,13 +10,11 @@
 #include <chrono>
 #include <exception>
 #include <functional>
-#include <map>
 #include <memory>
 #include <numeric>
 #include <thread>
 #include <utility>
 
-#include "isolated_peer.hpp"
 #include "node_events.hpp"
 #include "peers.hpp"
 #include "raised_thread.hpp"
@@ -25,7 +23,6 @@
 #include "redag/base/mutex.hpp"
 #include "redag/runtime/setup.hpp"
 #include "redag/runtime/threads.hpp"
-#include "redag/sched/policy.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"
 #include "redag_rclcpp/executor.hpp"
 #include "workload_nodes.hpp"
@@ -56,12 +53,6 @@ std::optional<PreemptionMode> preemption_of(const std::string &name) {
   return std::nullopt;
 }
 
-std::uint32_t number_of_tasks(const redag::Workload &workload) {
-  std::size_t tasks = 0;
-  for (const redag::Dag &dag : workload.dags) tasks += dag.tasks.size();
-  return static_cast<std::uint32_t>(tasks);
-}
-
 // In other modes an executor warns that it does not take part in a common order.
 bool can_be_os(PreemptionMode mode) { return mode == PreemptionMode::Os || mode == PreemptionMode::Auto; }
 
@@ -77,7 +68,6 @@ class Run {
     // The check judges max_active and groups by this number. The threads that ran bodies can be more.
     workers_ = options_.threads > 0 ? options_.threads : workload_.platform.workers;
     if (has_one_thread(options_.executor)) workers_ = 1;
-    if (is_isolated()) workers_ = number_of_tasks(workload_);
     workload_.platform.workers = workers_;
   }
 
@@ -95,24 +85,16 @@ class Run {
     if (auto connected = nodes_->connect(kConnectTimeout); !connected) return tl::unexpected(connected.error());
     try {
       make_executor();
-      if (is_isolated()) configurator_ = std::make_unique<ThreadConfigurator>(nodes_->nodes(), isolated_nodes());
     } catch (const std::runtime_error &error) {  // this process may not have the requested preemption
       return redag::make_error(error.what(), options_.executor == "redag-os" ? redag::runtime::realtime_hint() : "");
     }
     if (preempts_by_priority()) nodes_->note_absences();
-    if (is_isolated()) {
-      const std::size_t processes = options_.only_dag > 0 ? whole_.dags.size() : 1;
-      if (auto listen = configurator_->wait_until_they_listen(processes, kConnectTimeout); !listen) {
-        return tl::unexpected(listen.error());
-      }
-    }
     if (auto armed = arm(); !armed) return tl::unexpected(armed.error());
     const Duration cost = nodes_->measurement_cost();
     for (const auto &node : nodes_->nodes()) executor_->add_node(node);
     std::thread spinning([this] { spin(); });
     collect_and_end();
     spinning.join();
-    if (!configured_) return tl::unexpected(configured_.error());
     if (const auto failure = failure_text()) return redag::make_error(fmt::format("the executor failed: {}", *failure));
     collect();
     describe_run(cost);
@@ -161,33 +143,9 @@ class Run {
       redag.share_order = options_.only_dag > 0 && can_be_os(redag.preemption);
       redag_ = std::make_shared<ReDAGExecutor>(redag);
       executor_ = redag_;
-    } else if (is_isolated()) {
-      executor_ = make_isolated();
     } else {
       executor_ = make_peer(name, workers_);
     }
-  }
-
-  [[nodiscard]] bool is_isolated() const { return options_.executor == kIsolated; }
-
-  // For CIE's threads the priorities that ReDAGExecutor gives to the same callbacks in one process: those of the order
-  // of the whole workload.
-  [[nodiscard]] std::map<std::string, IsolatedNode> isolated_nodes() const {
-    const std::vector<redag::sched::Priority> order =
-        redag::sched::assign_priorities(whole_.dags, whole_.policy, whole_.ties);
-    const redag::runtime::PriorityBand band = redag::runtime::probe_priority_band();
-    std::map<std::string, IsolatedNode> nodes;
-    std::size_t next = first_task_;
-    const redag::Workload bound = nodes_->bound_workload();
-    for (std::size_t dag = 0; dag < workload_.dags.size(); ++dag) {
-      for (std::size_t i = 0; i < workload_.dags[dag].tasks.size(); ++i) {
-        const redag::Task &task = bound.dags[dag].tasks[i];
-        IsolatedNode &node = nodes[task.callback->node];
-        node.priority = std::max(node.priority, band.of_level(order[next++].level));
-        if (task.activation == redag::Activation::Timer) node.timers.push_back(task.period);
-      }
-    }
-    return nodes;
   }
 
   void spin() {
@@ -220,16 +178,13 @@ class Run {
   // A priority above the threads that execute bodies, which under overload leave no time to others. With os these
   // threads have priorities of their own. Under chrt they have this thread's priority.
   [[nodiscard]] int collecting_priority() const {
-    return preempts_by_priority() || is_isolated() ? redag::runtime::probe_priority_band().top_job + 1
-                                                   : redag::runtime::fifo_priority_above_this_thread();
+    return preempts_by_priority() ? redag::runtime::probe_priority_band().top_job + 1
+                                  : redag::runtime::fifo_priority_above_this_thread();
   }
 
   void collect_and_end() {
     const RaisedThread raised(collecting_priority());
-    if (configurator_ != nullptr) {
-      configured_ = configurator_->wait_for_priorities(timer_clock_now() - nodes_->now());  // until time 0
-    }
-    if (configured_) collect_until_end();
+    collect_until_end();
     nodes_->halt();
     if (!nodes_->wait_idle(timer_clock_now() + kDrainTimeout)) {
       nodes_->give_up();
@@ -240,7 +195,6 @@ class Run {
     // ReDAGExecutor, where cancel() is not virtual.
     while (!spin_ended_) {
       executor_->cancel();
-      if (is_isolated()) rclcpp::shutdown();  // its threads do not hear of cancel()
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
   }
@@ -317,8 +271,6 @@ class Run {
   std::unique_ptr<WorkloadNodes> nodes_;
   std::shared_ptr<rclcpp::Executor> executor_;  // declared after the nodes: destroyed before them
   std::shared_ptr<ReDAGExecutor> redag_;        // the same object, if it is a ReDAGExecutor
-  std::unique_ptr<ThreadConfigurator> configurator_;
-  redag::Result<void> configured_;
   std::vector<JobEvent> bodies_;
   std::vector<JobEvent> decisions_;
   Time end_ = 0;
@@ -333,7 +285,6 @@ const std::vector<std::string> &executor_names() {
   static const std::vector<std::string> kNames = [] {
     std::vector<std::string> all = {"redag", "redag-none", "redag-cooperative", "redag-os"};
     all.insert(all.end(), peer_names().begin(), peer_names().end());
-    all.emplace_back(kIsolated);
     return all;
   }();
   return kNames;
@@ -345,7 +296,6 @@ redag::Result<void> check_executor(const std::string &name) {
     return redag::make_error(fmt::format("there is no executor '{}'", name),
                              fmt::format("one of {}", fmt::join(names, ", ")));
   }
-  if (name == kIsolated) return check_isolated();
   return is_redag(name) ? redag::Result<void>() : check_peer(name);
 }
 

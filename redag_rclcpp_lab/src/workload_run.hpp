@@ -56,8 +56,8 @@ struct WorkloadRun {
 };
 
 /// `workload` must be valid. With `only_dag`, other processes run the other DAGs at the same time: the jobs are those
-/// of the whole workload, and ReDAGExecutor with preemption os shares one order with the others. With the executor
-/// `cie`, rclcpp is shut down at the end. Errors: requests that ROS or the machine refuse.
+/// of the whole workload, and ReDAGExecutor with preemption os shares one order with the others. Errors: requests that
+/// ROS or the machine refuse.
 [[nodiscard]] redag::Result<WorkloadRun> run_as_nodes(const redag::Workload &workload,
                                                       const WorkloadRunOptions &options);
 

@@ -119,31 +119,6 @@ class Robots(Case):
         broken = self.write("broken.yaml", arm.read_text().replace("wcet: 20ms, ", ""))
         self.expect(redag("arrange", broken, "--rtprio", "90"), 2, "broken.yaml:")
 
-    # --- from callback_isolated_executor ---
-
-    def test_an_import_is_filled_in_and_valid(self):
-        example = SOURCE / "examples" / "import" / "callback_groups.yaml"
-        robot = self.folder / "robot.yaml"
-        self.expect(redag("import", example, "-o", robot), 0, "to be filled in: 11 values, each written as TODO")
-        self.assertEqual(self.expect(redag("import", "-", text=example.read_text()), 0).stdout.count("TODO"), 12)
-        gaps = self.expect(redag("validate", robot), 2).stderr
-        self.assertEqual(len([line for line in gaps.splitlines() if "error: " in line and "'TODO'" in line]), 11, gaps)
-        text = robot.read_text()
-        for key, value in (("match", "{name: n}"), ("wcet", "1ms"), ("period", "100ms")):
-            text = text.replace(f"{key}: TODO", f"{key}: {value}")
-        robot.write_text(text)
-        self.expect(redag("validate", robot), 0)
-        levels = json.loads(self.expect(redag("arrange", robot, "--rtprio", "90", "--json"), 0).stdout)["levels"]
-        self.assertEqual([level["members"][0] for level in levels],
-                         ["wheels.wheels.timer_5ms", "lidar.lidar.subscription_scan", "logger.logger.timer_1s"])
-
-    def test_refuses_what_is_no_configuration(self):
-        self.expect(redag("import", EXAMPLE), 2, "cart.yaml:4:1: error: unknown key 'robot'")
-        self.expect(redag("import", self.folder / "none.yaml"), 2, "No such file")
-        wrong = self.write("groups.yaml", "callback_groups:\n  - {id: /a@Timer(5), policy: SCHED_FIFO, priority: high}\n")
-        self.expect(redag("import", wrong), 2, "groups.yaml:2:")
-        self.expect(redag("import", wrong, "-o", "/no/such/folder/x.yaml"), 2, "/no/such/folder/x.yaml")
-
     # --- a robot as one workload ---
 
     def test_a_robot_is_the_workload_written_by_hand(self):
@@ -220,20 +195,6 @@ dags:
         for process, hint in (("lidar_driver", "has no executor of ReDAG-RT"), ("drove", "did you mean 'drive'?")):
             result = self.expect(redag("arrange", EXAMPLE, "--rtprio", "90", "--levels", process), 2)
             self.assertIn(hint, result.stderr)
-
-    def test_each_host_has_its_own_order(self):
-        file = SOURCE / "examples" / "hosts" / "robot.yaml"
-        for host, levels in (("vision", [["vision.camera.grab", "vision.camera.detect"]]),
-                             ("drive", [["drive.control.pid"], ["drive.avoid.obstacles", "drive.avoid.brake"]])):
-            plan = json.loads(self.expect(redag("arrange", file, "--rtprio", "90", "--json", "--host", host), 0).stdout)
-            self.assertEqual([level["members"] for level in plan["levels"]], levels)
-            self.assertEqual([level["priority"] for level in plan["levels"]], [80, 79][:len(levels)])
-        self.assertEqual(self.expect(redag("arrange", file, "--rtprio", "90", "--levels", "vision"), 0).stdout, "80\n")
-        self.assertEqual(self.expect(redag("arrange", file, "--rtprio", "90", "--levels", "drive"), 0).stdout, "80,79\n")
-        self.expect(redag("arrange", file), 2, "has several hosts, and this machine", "--host vision, --host drive")
-        self.expect(redag("arrange", file, "--host", "dirve"), 2, "there is no host 'dirve'", "did you mean 'drive'?")
-        self.expect(redag("arrange", file, "--levels", "dirve"), 2, "there is no process 'dirve'", "did you mean 'drive'?")
-        self.expect(redag("arrange", EXAMPLE, "--host", "drive"), 2, "has no hosts")
 
     # --- real threads ---
 

@@ -31,8 +31,6 @@ RESULTS = {
     "results/os": [*ROBOT[:3], "cooperative", *ROBOT[4:]],
     "results/after": [*ROBOT, "--seed", "2"], "results/branch": [*ROBOT, "--seed", "3"],
     "results/cmp": ["compare", "workloads/robot.yaml", "--simulate", "--executors", "redag,mte", "--duration", "2s"],
-    "results/vision": ["simulate", "examples/hosts/vision.yaml", "--duration", "2s"],
-    "results/drive": ["simulate", "examples/hosts/drive.yaml", "--duration", "2s"],
     "results/dags-1": ["experiment", "acceptance", "experiments/acceptance_dags.yaml", "--shard", "1/2"],
     "results/dags-2": ["experiment", "acceptance", "experiments/acceptance_dags.yaml", "--shard", "2/2"],
 }
@@ -142,10 +140,9 @@ class Examples(Case):
             if "--" not in example or "--interval" in example:  # a screen, until it is interrupted
                 example = example.replace("redag top", f"redag top {pid}") if example == "redag top" else example
                 example = f"script --quiet --return --command 'timeout --foreground --preserve-status -s INT 2 {example}' /dev/null"
-        if name in ("serve", "export"):
+        if name == "serve":  # until it is interrupted
             self.running_executor()
-            if "--once" not in example:  # serves until it is interrupted
-                example = f"timeout --preserve-status -s INT 2 {example}"
+            example = f"timeout --preserve-status -s INT 2 {example}"
         return example
 
     def lacking(self, command, example):
@@ -155,8 +152,6 @@ class Examples(Case):
             return "no right to use SCHED_FIFO"
         if "--affinity" in example and len(os.sched_getaffinity(0)) < 2:
             return "two processors are needed"
-        if "--prometheus" in example and "without Prometheus" in redag("export", "--prometheus", "--once").stderr:
-            return "this redag was built without Prometheus"
         for tool in ("jq", "man", "script"):
             if re.search(rf"(?:\| |^){tool} ", example) and not shutil.which(tool):
                 return f"{tool} is not installed"

@@ -47,8 +47,6 @@ class EveryOption(Case):
     def arguments(self, command):
         if command in (["generate"], ["calibrate"], ["top"], ["experiment"], ["experiment", "acceptance"]):
             return []
-        if command == ["merge-traces"]:
-            return ["--out", self.folder / "out"]
         return [self.cart, self.cart] if command == ["diff"] else [self.cart]
 
     def refuse(self, command, option, value):

@@ -11,12 +11,28 @@ import json
 import os
 import pathlib
 import re
+import shutil
 import signal
 import socket
 import subprocess
 import tempfile
+import unittest
 
-from program import PROGRAM, Case, main, redag
+from program import PROGRAM, SOURCE, Case, main, redag
+
+DASHBOARD = SOURCE / "redag_lab" / "share" / "grafana" / "redag.json"
+
+
+def samples(text):
+    """Returns {(name, labels): value} of Prometheus's text format."""
+    found = {}
+    for line in text.splitlines():
+        if line.startswith("#"):
+            continue
+        name, labels, value = re.fullmatch(r"(\w+)(?:\{(.*)\})? (\S+)", line).groups()
+        pairs = re.findall(r'(\w+)="((?:[^"\\]|\\.)*)"', labels or "")
+        found[name, frozenset(pairs)] = float(value)
+    return found
 
 
 class Serve(Case):
@@ -36,8 +52,8 @@ class Serve(Case):
         self.assertTrue(match, address)
         self.port, self.token = int(match[1]), match[2]
 
-    def run_executor(self):
-        process = subprocess.Popen([PROGRAM, "run", self.cart, "--duration", "1h", "--json"],
+    def run_executor(self, workload=None):
+        process = subprocess.Popen([PROGRAM, "run", workload or self.cart, "--duration", "1h", "--json"],
                                    stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         self.addCleanup(process.wait)
         self.addCleanup(process.kill)
@@ -67,7 +83,7 @@ class Serve(Case):
         return next(event for event in self.events(path) if is_wanted(event))
 
     def test_without_the_token_there_is_nothing(self):
-        for path in ("/", "/live.js", "/style.css", "/echarts.js", "/events", "/nothing", "/?token=", "/?token=" + "0" * 64,
+        for path in ("/", "/live.js", "/style.css", "/echarts.js", "/events", "/metrics", "/nothing", "/?token=", "/?token=" + "0" * 64,
                      "/events?token=" + self.token, "/live.js?token=" + self.token):
             response = self.ask(path, token=False)
             self.assertEqual(response.status, 403, path)
@@ -139,6 +155,92 @@ class Serve(Case):
         first.wait()
         self.assertEqual(next(event for event in stream if event["frame"] is None)["list"]["executors"], [])
         self.assertEqual(self.ask("/events?executor=x").status, 400)
+
+    def metrics(self):
+        response = self.ask("/metrics")
+        self.assertEqual(response.status, 200)
+        self.assertEqual(response.headers["Content-Type"], "text/plain; version=0.0.4; charset=utf-8")
+        return response.read().decode()
+
+    def test_metrics_are_the_figures_of_top(self):
+        self.assertEqual(samples(self.metrics()), {("redag_unreadable_pages", frozenset()): 0})
+        run = self.run_executor()
+        while not all(task["finished"] > 3 for task in json.loads(redag("top", run.pid, "--json").stdout)["tasks"]):
+            self.assertIsNone(run.poll())
+        before = json.loads(redag("top", run.pid, "--json").stdout)
+        found = samples(self.metrics())
+        after = json.loads(redag("top", run.pid, "--json").stdout)
+        executor = {("executor", "cart"), ("pid", str(run.pid)), ("number", "0")}
+        self.assertEqual(found["redag_executor_workers", frozenset(executor)], 1)
+        for i, task in enumerate(after["tasks"]):
+            labels = executor | {("dag", task["dag"]), ("task", task["name"])}
+
+            def value(name, *more, labels=labels):
+                return found[name, frozenset(labels | set(more))]
+
+            for metric, key in [(value("redag_jobs_released_total"), "released"),
+                                (value("redag_jobs_ended_total", ("outcome", "finished")), "finished"),
+                                (value("redag_deadline_misses_total"), "misses"),
+                                (round(value("redag_cpu_seconds_total") * 1e9), "cpu_ns")]:
+                self.assertLessEqual(before["tasks"][i][key], metric)
+                self.assertGreaterEqual(after["tasks"][i][key], metric)
+            self.assertEqual(round(value("redag_deadline_seconds") * 1e9), task["deadline_ns"])
+            buckets = sorted((float(dict(key[1])["le"]), count) for key, count in found.items()
+                             if key[0] == "redag_response_seconds_bucket" and labels <= key[1])
+            counts = [count for _, count in buckets]
+            self.assertEqual(counts, sorted(counts), "they are cumulative")
+            self.assertEqual(buckets[-1], (float("inf"), value("redag_response_seconds_count")))
+            # The longest response lies in the last class that adds jobs, of at most half an octave.
+            longest = value("redag_response_max_seconds")
+            most = next(bound for bound, count in buckets if count == counts[-1])
+            self.assertLessEqual(longest, most)
+            self.assertGreater(longest, most / 1.6)
+
+    def test_metrics_have_one_block_each(self):
+        self.run_executor()
+        self.run_executor()
+        (self.pages / "redag.1.0").write_bytes(b"nonsense")
+        text = self.metrics()
+        self.assertIn("\nredag_unreadable_pages 1\n", text)
+        names = [line.split()[2] for line in text.splitlines() if line.startswith("# TYPE")]
+        self.assertEqual(len(names), len(set(names)))
+        blocks = re.split(r"^# HELP ", text, flags=re.M)[1:]
+        for name, block in zip(names, blocks, strict=True):
+            for line in block.splitlines()[2:]:
+                self.assertRegex(line, rf"^{name}(_bucket|_count|_sum)?(\{{| )")
+
+    def test_the_dashboard_asks_for_metrics_that_exist(self):
+        self.run_executor()
+        self.run_executor(SOURCE / "workloads" / "perception.yaml")  # has a device
+        names = set(re.findall(r"\bredag_\w+", self.metrics()))
+        for panel in json.loads(DASHBOARD.read_text())["panels"]:
+            for target in panel["targets"]:
+                for name in re.findall(r"\bredag_\w+", target["expr"]):
+                    # Neither has an end-to-end deadline.
+                    if name != "redag_end_to_end_deadline_seconds":
+                        self.assertIn(name, names, panel["title"])
+
+    @unittest.skipUnless(shutil.which("promtool"), "promtool is not installed")
+    def test_promtool_finds_no_fault(self):
+        self.run_executor()
+        result = subprocess.run(["promtool", "check", "metrics"], input=self.metrics(), capture_output=True, text=True,
+                                check=False)
+        self.assertEqual((result.returncode, result.stdout + result.stderr), (0, ""))
+
+    def test_a_token_that_other_programs_know(self):
+        token = self.write("token", "0123456789abcdef" * 2 + "\n")
+        token.chmod(0o600)
+        with subprocess.Popen([PROGRAM, "serve", "--port", "0", "--token-file", token, "--folder", self.pages],
+                              stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as server:
+            match = re.search(r":(\d+)/\?token=(\w+)", server.stdout.readline())
+            self.assertEqual(match[2], token.read_text().strip())
+            self.port, self.token = int(match[1]), match[2]
+            self.assertIn("redag_unreadable_pages 0", self.metrics())
+            self.assertEqual(self.ask("/metrics", token=False).status, 403)
+            server.kill()
+        token.chmod(0o644)
+        self.expect(redag("serve", "--token-file", token), 2, "every user of this machine can read the token", "chmod 600")
+        self.expect(redag("serve", "--token-file", self.folder / "none"), 2, "cannot be read", "openssl rand")
 
     def test_only_so_many_watch_at_a_time(self):
         streams = [self.events() for _ in range(8)]

@@ -13,8 +13,8 @@ import subprocess
 
 from program import CART, MISTAKEN, PROGRAM, SOURCE, Case, main, redag
 
-COMMANDS = [["validate"], ["generate"], ["simulate"], ["run"], ["calibrate"], ["compare"], ["diff"], ["analyze"], ["sensitivity"], ["assign"], ["tune"], ["arrange"], ["import"],
-            ["check-trace"], ["recover"], ["merge-traces"], ["events"], ["why"], ["top"], ["serve"], ["export"], ["report"], ["completion"], ["man"], ["experiment"], ["experiment", "acceptance"],
+COMMANDS = [["validate"], ["generate"], ["simulate"], ["run"], ["calibrate"], ["compare"], ["diff"], ["analyze"], ["sensitivity"], ["assign"], ["tune"], ["arrange"],
+            ["check-trace"], ["recover"], ["events"], ["why"], ["top"], ["serve"], ["report"], ["completion"], ["man"], ["experiment"], ["experiment", "acceptance"],
             ["experiment", "factorial"], ["experiment", "merge"], ["experiment", "cost"], ["experiment", "submit"]]
 
 

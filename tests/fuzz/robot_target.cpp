@@ -6,16 +6,12 @@
 
 #include "redag/base/check.hpp"
 #include "redag_lab/robot/changes.hpp"
-#include "redag_lab/robot/cie.hpp"
 #include "redag_lab/robot/input.hpp"
 #include "tests/fuzz/targets.hpp"
 
 namespace redag::fuzz {
 
 void robot_target(std::string_view input) {
-  if (const Result<robot::cie::Imported> imported = robot::cie::import_robot(input, "fuzz.yaml")) {
-    REDAG_CHECK(yaml::parse(imported->text, "robot.yaml").has_value(), "a robot file that was made is YAML");
-  }
   const Result<robot::Input> read = robot::parse_input(input, "fuzz.yaml");
   if (!read) {
     REDAG_CHECK(!read.error().empty(), "a refusal says why");
@@ -28,16 +24,11 @@ void robot_target(std::string_view input) {
   } else {
     REDAG_CHECK(!read->workload.error().empty(), "a refusal says why");
   }
-  std::vector<robot::Robot> parts;
-  for (std::size_t host = 0; host < read->robot->hosts.size(); ++host) parts.push_back(part_of(*read->robot, host));
-  if (parts.empty()) parts.push_back(*std::move(read->robot));
-  for (const robot::Robot &part : parts) {
-    for (const int limit : {3, 90}) {
-      const Result<robot::Plan> plan = robot::plan_of(part, runtime::band_up_to(limit));
-      if (!plan) continue;
-      REDAG_CHECK(plan->of_threads.size() == part.threads.size(), "each entry has its level");
-      (void)robot::changes_of(part, *plan, {});
-    }
+  for (const int limit : {3, 90}) {
+    const Result<robot::Plan> plan = robot::plan_of(*read->robot, runtime::band_up_to(limit));
+    if (!plan) continue;
+    REDAG_CHECK(plan->of_threads.size() == read->robot->threads.size(), "each entry has its level");
+    (void)robot::changes_of(*read->robot, *plan, {});
   }
 }
 

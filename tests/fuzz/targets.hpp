@@ -13,10 +13,8 @@ namespace redag::fuzz {
 /// Reads workload YAML, for the simulator and for ROS 2 (callbacks, no wcet). An accepted workload must survive being
 /// written.
 void workload_target(std::string_view input);
-/// Reads robots, with their unions and plans, and configurations that become robots.
+/// Reads robots, with their unions and plans.
 void robot_target(std::string_view input);
-/// Reads a file of hosts, texts of time services, and offsets, rates and links of the command line.
-void hosts_target(std::string_view input);
 /// Reads plans of experiments.
 void plan_target(std::string_view input);
 /// Reads events.jsonl, and makes everything that is made of a trace: checks, summary, jobs.csv, Perfetto, report.
@@ -55,7 +53,6 @@ inline constexpr std::array kTargets = {
     Target{"values", values_target},     Target{"commands", commands_target},
     Target{"flight", flight_target},     Target{"kernel_record", kernel_record_target},
     Target{"robot", robot_target},       Target{"order_page", order_page_target},
-    Target{"hosts", hosts_target},
 };
 
 }  // namespace redag::fuzz

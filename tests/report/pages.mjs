@@ -13,8 +13,6 @@ FIGURES.worlds = ['curves', 'distance', 'worlds'];
 FIGURES.executors = ['worlds'];
 FIGURES.single = FIGURES.perception = FIGURES.hostile = FIGURES.long = FIGURES.wide = FIGURES.comparison.slice(2);
 
-FIGURES.hosts = ['chains', ...FIGURES.single];
-
 export const PHONE = {viewport: {width: 390, height: 844}, isMobile: true, hasTouch: true, deviceScaleFactor: 2};
 
 /** Starts Chromium for the pages in the folder `scratch`. */

@@ -19,7 +19,6 @@
 #include "redag_lab/cli/terminal/signals.hpp"
 #include "redag_lab/experiment/acceptance_results.hpp"
 #include "redag_lab/experiment/folder.hpp"
-#include "redag_lab/hosts/document.hpp"
 #include "redag_lab/report/document.hpp"
 #include "redag_lab/report/experiment.hpp"
 #include "redag_lab/report/page.hpp"
@@ -95,13 +94,6 @@ class Reporting {
           console_.note(kernel.error());
           return false;
         }
-        Result<std::optional<hosts::RecordedHosts>> hosts = hosts::read_hosts_of(file, trace->info());
-        if (!hosts) {
-          progress_.clear();
-          console_.note(hosts.error());
-          return false;
-        }
-        if (*hosts && !any) group.set_hosts({std::move((*hosts)->document), (*hosts)->missed, (*hosts)->unknown});
         const Result<void> added = group.add(fs::path(file).parent_path().string(), *trace, *kernel);
         if (!added) {
           progress_.clear();
@@ -142,8 +134,6 @@ class Reporting {
     }
     std::string text;
     for (const report::Group &group : groups_) {
-      // What is true of each host is not all that the page says.
-      if (group.hosts().missed + group.hosts().unknown > 0) text += report::headline_of({&group, 1}).text + "\n";
       text += (groups_.size() > 1 ? group.label() + ": " : "") + report::verdict_of(group).front().text + "\n";
     }
     text += fmt::format("{}: {:.1f} MB, opens in any browser without a network\n", path,

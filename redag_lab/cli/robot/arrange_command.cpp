@@ -42,7 +42,6 @@ struct ArrangeOptions {
   std::uint32_t rtprio = 0;  // 0: what this process may use
   std::string state;
   std::string levels;  // name of a process
-  std::string host;
 
   [[nodiscard]] bool changes_something() const { return apply || watch; }
 };
@@ -75,35 +74,6 @@ std::optional<std::size_t> process_of_levels(const ArrangeOptions &options, cons
   }
   console.error(fmt::format("--levels: there is no process {}", in_quotes(options.levels)),
                 suggestion(options.levels, names));
-  return std::nullopt;
-}
-
-// Returns what is on the host that the user names, or that has the process of --levels or the name of this machine.
-std::optional<robot::Robot> part_here(const ArrangeOptions &options, robot::Robot robot, Console &console) {
-  if (robot.hosts.empty()) {
-    if (options.host.empty()) return robot;
-    console.error(fmt::format("--host: {} has no hosts", options.file), "list them under 'hosts:', see docs/robot.md");
-    return std::nullopt;
-  }
-  const auto part = [&](const std::string &name) -> std::optional<robot::Robot> {
-    const auto found = std::find(robot.hosts.begin(), robot.hosts.end(), name);
-    if (found == robot.hosts.end()) return std::nullopt;
-    return part_of(robot, static_cast<std::size_t>(found - robot.hosts.begin()));
-  };
-  if (!options.host.empty()) {
-    if (std::optional<robot::Robot> named = part(options.host)) return named;
-    console.error(fmt::format("--host: there is no host {}", in_quotes(options.host)),
-                  suggestion(options.host, robot.hosts));
-    return std::nullopt;
-  }
-  if (!options.levels.empty()) {
-    const std::optional<std::size_t> process = process_of_levels(options, robot, console);
-    return process ? std::optional(part_of(robot, host_of(robot, *process))) : std::nullopt;
-  }
-  const std::string machine = current_provenance().host;
-  if (std::optional<robot::Robot> own = part(machine)) return own;
-  console.error(fmt::format("{} has several hosts, and this machine, '{}', is none of them", options.file, machine),
-                fmt::format("name one of them: --host {}", fmt::join(robot.hosts, ", --host ")));
   return std::nullopt;
 }
 
@@ -233,9 +203,7 @@ int watch(const ArrangeOptions &options, const robot::Robot &robot, const robot:
 }
 
 int arrange(const ArrangeOptions &options, Console &console) {
-  std::optional<robot::Robot> whole = load_robot(options.file, console);
-  if (!whole) return kExitBad;
-  const std::optional<robot::Robot> loaded = part_here(options, *std::move(whole), console);
+  const std::optional<robot::Robot> loaded = load_robot(options.file, console);
   if (!loaded) return kExitBad;
   const robot::Robot &robot = *loaded;
   const robot::System system;
@@ -286,10 +254,6 @@ Action add_arrange(CLI::App &app) {
   CLI::Option *const levels =
       app.add_option("--levels", options->levels, "Print REDAG_LEVELS for the executor of one process")
           ->type_name("PROCESS");
-  app.add_option(
-         "--host", options->host,
-         "Host of the robot whose part is meant (default: that of the process, or with the name of this machine)")
-      ->type_name("HOST");
   const std::vector<CLI::Option *> modes = {dry, apply, watch, undo, levels};
   for (CLI::Option *const mode : modes) {
     for (CLI::Option *const other : modes) {

@@ -5,12 +5,20 @@
 
 #include <fmt/format.h>
 #include <sys/random.h>
+#include <sys/stat.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
+#include <fstream>
 #include <system_error>
 
 namespace redag::cli {
+namespace {
+
+bool is_letter_or_digit(char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
+
+}  // namespace
 
 Result<std::string> make_token() {
   std::array<unsigned char, 32> bytes{};
@@ -25,6 +33,27 @@ Result<std::string> make_token() {
   }
   std::string token;
   for (const unsigned char byte : bytes) token += fmt::format("{:02x}", byte);
+  return token;
+}
+
+Result<std::string> read_token(const std::string &path) {
+  struct stat status {};
+  std::ifstream file(path);
+  std::string token;
+  if (!file || ::stat(path.c_str(), &status) != 0 || !S_ISREG(status.st_mode)) {
+    return make_error(fmt::format("{}: the token cannot be read", path), "make one: openssl rand -hex 32 > FILE");
+  }
+  if ((status.st_mode & S_IRWXO) != 0) {
+    return make_error(fmt::format("{}: every user of this machine can read the token", path),
+                      fmt::format("chmod 600 {0}, or 640 and the group of the program that reads it", path));
+  }
+  file >> token;
+  constexpr std::size_t kLeast = 32;
+  constexpr std::size_t kMost = 256;  // a header has room for it
+  if (token.size() < kLeast || token.size() > kMost || !std::all_of(token.begin(), token.end(), is_letter_or_digit)) {
+    return make_error(fmt::format("{}:1: a token has {} to {} letters and digits", path, kLeast, kMost),
+                      "make one: openssl rand -hex 32 > FILE");
+  }
   return token;
 }
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Who may see what `redag serve` serves: who knows the token, and asks for it by the server's own name. Values and pure
-// functions, except make_token().
+// functions, except make_token() and read_token().
 #pragma once
 
 #include <cstdint>
@@ -15,6 +15,10 @@ namespace redag::cli {
 
 /// Returns 256 random bits of the kernel as hexadecimal digits. Error: the kernel gives none.
 [[nodiscard]] Result<std::string> make_token();
+
+/// Reads a token that programs share with the server. Error: the file cannot be read, others than its owner and group
+/// may open it, or the token is easy to guess.
+[[nodiscard]] Result<std::string> read_token(const std::string &path);
 
 /// Compares in a time that depends on the lengths only.
 [[nodiscard]] bool is_same_secret(std::string_view given, std::string_view secret) noexcept;

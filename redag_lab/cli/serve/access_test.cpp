@@ -5,6 +5,11 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <string>
 
 namespace redag::cli {
 namespace {
@@ -18,6 +23,26 @@ TEST(Access, TokensAreLongAndDiffer) {
   ASSERT_TRUE(first && second);
   EXPECT_THAT(*first, MatchesRegex("[0-9a-f]{64}"));
   EXPECT_NE(*first, *second);
+}
+
+TEST(Access, ATokenIsReadFromAFileThatFewMayRead) {
+  const std::string path = ::testing::TempDir() + "token";
+  const auto read = [&](const std::string &content, ::mode_t mode) {
+    (void)::unlink(path.c_str());
+    std::ofstream(path) << content;
+    EXPECT_EQ(::chmod(path.c_str(), mode), 0);
+    const Result<std::string> token = read_token(path);
+    return token ? *token : token.error().to_string();
+  };
+  const std::string good(32, 'a');
+  EXPECT_EQ(read(good + "\n", 0600), good);
+  EXPECT_EQ(read(good, 0640), good);
+  EXPECT_THAT(read(good, 0604), HasSubstr("every user of this machine can read the token"));
+  for (const std::string &bad : {std::string(), std::string(31, 'a'), std::string(257, 'a'), good + "&x=1"}) {
+    EXPECT_THAT(read(bad, 0600), HasSubstr(path + ":1: a token has 32 to 256 letters and digits")) << bad;
+  }
+  EXPECT_FALSE(read_token(path + ".none"));
+  EXPECT_FALSE(read_token(::testing::TempDir()));
 }
 
 TEST(Access, SecretsAreComparedAsAWhole) {

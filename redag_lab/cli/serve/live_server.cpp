@@ -11,8 +11,11 @@
 #include <thread>
 #include <utility>
 
+#include "redag/live/reader.hpp"
+#include "redag/runtime/clock.hpp"
 #include "redag_lab/cli/serve/access.hpp"
 #include "redag_lab/cli/serve/live_feed.hpp"
+#include "redag_lab/cli/serve/metrics.hpp"
 #include "redag_lab/report/page_assets.hpp"
 
 namespace redag::cli {
@@ -59,7 +62,7 @@ void refuse(httplib::Response &response, int status, const char *why) {
 class Server : public LiveServer {
  public:
   explicit Server(const ServeOptions &options)
-      : token_(options.token), feed_(options.folder, options.interval, kWatchers) {
+      : token_(options.token), folder_(options.folder), feed_(options.folder, options.interval, kWatchers) {
     server_.new_task_queue = [] { return new httplib::ThreadPool(kThreads); };
     server_.set_payload_max_length(1024);
     server_.set_read_timeout(kTimeout);
@@ -126,6 +129,10 @@ class Server : public LiveServer {
         response.set_content(asset.content.data(), asset.content.size(), asset.type);
       });
     }
+    server_.Get("/metrics", [this](const httplib::Request &, httplib::Response &response) {
+      const std::vector<live::Listed> pages = live::list_pages(folder_);
+      response.set_content(metrics_text(pages, runtime::monotonic_now()), "text/plain; version=0.0.4; charset=utf-8");
+    });
     server_.Get("/events",
                 [this](const httplib::Request &request, httplib::Response &response) { stream(request, response); });
   }
@@ -151,6 +158,7 @@ class Server : public LiveServer {
   }
 
   const std::string token_;
+  const std::string folder_;
   int port_ = -1;
   LiveFeed feed_;  // the server's threads use it
   httplib::Server server_;

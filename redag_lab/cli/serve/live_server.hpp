@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The HTTP server of `redag serve`: the page, its files, and the stream of states. It listens on the loopback device,
-// changes nothing, and answers only who knows the token.
+// The HTTP server of `redag serve`: the page, its files, the stream of states, and metrics. It listens on the loopback
+// device, changes nothing, and answers only who knows the token.
 //
 // Threads: a fixed number answers requests; the object is used by one thread.
 #pragma once

@@ -23,11 +23,12 @@ struct ServeArguments {
   std::uint32_t port = kPort;
   Duration interval = kSecond;
   std::string folder = live::kFolder;
+  std::string token_file;
 };
 
 int serve(const ServeArguments &options, Console &console) {
   const InterruptGuard guard;
-  const Result<std::string> token = make_token();
+  const Result<std::string> token = options.token_file.empty() ? make_token() : read_token(options.token_file);
   if (!token) {
     console.note(token.error());
     return kExitBad;
@@ -60,6 +61,8 @@ Action add_serve(CLI::App &app) {
   add_count(app, "--port", options->port, Range<std::uint32_t>{0, 65535}, "Port on 127.0.0.1; 0: a free one");
   add_duration(app, "--interval", options->interval, "Time between two updates");
   add_pages_folder(app, options->folder);
+  app.add_option("--token-file", options->token_file, "File with the token, instead of a new one at each start")
+      ->type_name("FILE");
   return [options](Console &console) { return serve(*options, console); };
 }
 

@@ -31,17 +31,14 @@ Action add_sensitivity(CLI::App &app);
 Action add_assign(CLI::App &app);
 Action add_tune(CLI::App &app);
 Action add_arrange(CLI::App &app);
-Action add_import(CLI::App &app);
 Action add_experiment(CLI::App &app);
 Action add_check_trace(CLI::App &app);
 Action add_events(CLI::App &app);
 Action add_recover(CLI::App &app);
-Action add_merge_traces(CLI::App &app);
 Action add_report(CLI::App &app);
 Action add_top(CLI::App &app);
 Action add_serve(CLI::App &app);
 Action add_why(CLI::App &app);
-Action add_export(CLI::App &app);
 Action add_completion(CLI::App &app);
 Action add_man(CLI::App &app);
 

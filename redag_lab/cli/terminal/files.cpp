@@ -109,9 +109,8 @@ bool is_result_name(std::string_view name) {
   if (const std::size_t at = name.rfind(".tmp."); at != std::string_view::npos && is_number(name.substr(at + 5))) {
     name = name.substr(0, at);
   }
-  constexpr std::array<std::string_view, 36> kNames = {"jobs.csv",
+  constexpr std::array<std::string_view, 35> kNames = {"jobs.csv",
                                                        "summary.json",
-                                                       "hosts.json",
                                                        "trace.pftrace",
                                                        "trace.json",  // of earlier versions
                                                        "events.redag",

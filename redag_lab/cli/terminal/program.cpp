@@ -84,9 +84,6 @@ constexpr std::array kCommands = {
           "  redag arrange examples/robot/cart.yaml --levels drive\n"
           "  sudo redag arrange examples/robot/cart.yaml --apply\n"
           "  sudo redag arrange examples/robot/cart.yaml --undo\n"},
-    Entry{"import", "Make a robot file of the configuration of callback_isolated_executor", add_import,
-          "  redag import examples/import/callback_groups.yaml\n"
-          "  redag import examples/import/callback_groups.yaml -o robot.yaml\n"},
     Entry{"experiment", "Run experiments over many workloads: seeded, parallel, resumable", add_experiment,
           "  redag experiment acceptance experiments/acceptance_tasks.yaml\n"
           "  redag experiment acceptance --help\n"
@@ -101,13 +98,6 @@ constexpr std::array kCommands = {
     Entry{"recover", "Recover the results of a run that was killed", add_recover,
           "  redag recover results/os\n"
           "  redag recover results/os --out results/rescued --keep\n"},
-    Entry{"merge-traces", "Merge the results of several hosts into one, on one clock", add_merge_traces,
-          "  redag merge-traces --host vision=results/vision --host drive=results/drive \\\n"
-          "    --offset vision=0 --offset drive=1.25ms+-80us --out results/robot\n"
-          "  redag merge-traces --host vision=results/vision --host drive=results/drive \\\n"
-          "    --clock vision=examples/hosts/vision.txt \\\n"
-          "    --clock drive=examples/hosts/drive.txt \\\n"
-          "    --robot examples/hosts/robot.yaml --out results/robot\n"},
     Entry{"why", "Explain why deadlines of a recorded run were missed", add_why,
           "  redag why results/demo\n"
           "  redag why results/demo control.controller\n"
@@ -122,13 +112,9 @@ constexpr std::array kCommands = {
           "  redag top --all --once\n"
           "  redag top 1234 --interval 500ms --sort misses\n"
           "  redag top 1234 --once --json\n"},
-    Entry{"serve", "Show the running executors in a browser of this machine", add_serve,
+    Entry{"serve", "Show the running executors in a browser, or to Prometheus", add_serve,
           "  redag serve\n"
           "  redag serve --port 0 --interval 500ms\n"},
-    Entry{"export", "Serve the figures of running executors to Prometheus", add_export,
-          "  redag export --prometheus\n"
-          "  redag export --prometheus --listen 127.0.0.1:9000\n"
-          "  redag export --prometheus --once | grep misses\n"},
     Entry{"completion", "Write what a shell needs to complete commands, options and files", add_completion,
           "  source <(redag completion bash)\n"
           "  redag completion zsh --output _redag\n"

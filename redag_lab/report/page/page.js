@@ -91,7 +91,6 @@ function detailSections() {
   return [
     ...pick,
     several ? filled(() => [element(`p.headline.${groups[state.executor].headline.tone}`, {}, ...headlineParts(groups[state.executor].headline)), verdictOf(groups[state.executor])]) : null,
-    ...hostsSection(groups.find((group) => group.hosts)?.hosts),
     heading(2, 'dags', 'DAGs'), filled(() => dagTable(groups[state.executor])),
     heading(2, 'tasks', 'Tasks: measured times and bounds'),
     filled(() => {

@@ -1,57 +1,23 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_lab/cli/export/prometheus_exporter.hpp"
+#include "redag_lab/cli/serve/metrics.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "redag/live/reader.hpp"
-#ifdef REDAG_PROMETHEUS
-#include <prometheus/text_serializer.h>
-
-#include "redag_lab/cli/export/prometheus_metrics.hpp"
-#endif
 
 namespace redag::cli {
 namespace {
 
 using ::testing::HasSubstr;
 
-std::string endpoint(const char *text) {
-  const Result<Endpoint> parsed = parse_endpoint(text);
-  return parsed ? parsed->text() : "none";
-}
-
-TEST(PrometheusEndpoint, IsReadFromHostAndPort) {
-  EXPECT_EQ(Endpoint().text(), "127.0.0.1:9464");
-  EXPECT_EQ(endpoint("9000"), "127.0.0.1:9000");
-  EXPECT_EQ(endpoint("0.0.0.0"), "0.0.0.0:9464");
-  EXPECT_EQ(endpoint("10.1.2.3:0"), "10.1.2.3:0");
-  EXPECT_EQ(endpoint("localhost:9000"), "127.0.0.1:9000");
-  EXPECT_EQ(endpoint("[::1]:9000"), "[::1]:9000");
-  EXPECT_EQ(endpoint("[::1]"), "[::1]:9464");
-  EXPECT_EQ(endpoint("::1"), "[::1]:9464");
-  for (const char *bad : {"", ":", "robot", "robot:80", "127.0.0.1:", "127.0.0.1:65536", "127.0.0.1:-1", "[::1",
-                          "[]:80", "[::1]80", "[::1]:", "127.0.0.1:80,443s", "127.0.0.1:80 "}) {
-    EXPECT_EQ(endpoint(bad), "none") << bad;
-  }
-}
-
-TEST(PrometheusEndpoint, LoopbackIsKnown) {
-  EXPECT_TRUE(parse_endpoint("127.0.0.2:1")->is_loopback());
-  EXPECT_TRUE(parse_endpoint("[::1]:1")->is_loopback());
-  EXPECT_FALSE(parse_endpoint("0.0.0.0:1")->is_loopback());
-  EXPECT_FALSE(parse_endpoint("[::]:1")->is_loopback());
-}
-
-#ifdef REDAG_PROMETHEUS
-
 constexpr Duration kMs = kMillisecond;
 
 live::Frame frame() {
   live::Frame frame;
-  frame.name = "a \"cart\"";
+  frame.name = "a \"cart\"\\\n";
   frame.program = "redag";
   frame.workers = 2;
   frame.began = kSecond;
@@ -75,13 +41,11 @@ live::Frame frame() {
   return frame;
 }
 
-std::string text_of(const std::vector<live::Listed> &pages) {
-  return prometheus::TextSerializer().Serialize(metrics_of(pages, 4 * kSecond));
-}
+std::string text_of(const std::vector<live::Listed> &pages) { return metrics_text(pages, 4 * kSecond); }
 
-TEST(PrometheusMetrics, AreInSecondsAndNamedByExecutorDagAndTask) {
+TEST(Metrics, AreInSecondsAndNamedByExecutorDagAndTask) {
   const std::string text = text_of({{"redag.7.1", 7, 1, live::Page{{}, frame()}}});
-  const std::string executor = R"(executor="a \"cart\"",pid="7",number="1")";
+  const std::string executor = R"(executor="a \"cart\"\\\n",pid="7",number="1")";
   const std::string task = executor + R"(,dag="fast",task="sense")";
   for (const std::string &line : {"redag_executor_workers{" + executor + "} 2",
                                   "redag_executor_uptime_seconds{" + executor + "} 2",
@@ -109,21 +73,19 @@ TEST(PrometheusMetrics, AreInSecondsAndNamedByExecutorDagAndTask) {
 }
 
 // Each bucket states the longest time of its class: 1024 ns belongs to the next one.
-TEST(PrometheusMetrics, BucketsAreCumulative) {
+TEST(Metrics, BucketsAreCumulative) {
   const std::string text = text_of({{"redag.7.1", 7, 1, live::Page{{}, frame()}}});
   EXPECT_THAT(text, HasSubstr("le=\"1.535e-06\"} 4\n"));
   EXPECT_THAT(text, HasSubstr("le=\"2.047e-06\"} 6\n"));
   EXPECT_THAT(text, HasSubstr("le=\"+Inf\"} 7\n"));
 }
 
-TEST(PrometheusMetrics, PagesThatCannotBeReadAreCounted) {
+TEST(Metrics, PagesThatCannotBeReadAreCounted) {
   EXPECT_EQ(text_of({{"redag.7.0", 7, 0, make_error("damaged")}}),
-            "# HELP redag_unreadable_pages Live pages that the exporter could not read.\n"
+            "# HELP redag_unreadable_pages Live pages that could not be read.\n"
             "# TYPE redag_unreadable_pages gauge\n"
             "redag_unreadable_pages 1\n");
 }
-
-#endif
 
 }  // namespace
 }  // namespace redag::cli
