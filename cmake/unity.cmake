@@ -7,14 +7,6 @@
 
 # These are compiled alone: another source of their target has an anonymous namespace with the same name in it.
 set(alone
-  redag/model/callback_match_test.cpp
-  redag/model/demand_test.cpp
-  redag/model/workload_yaml_mistakes_test.cpp
-  redag/runtime/engine_short_jobs_test.cpp
-  redag/runtime/executor_options_test.cpp
-  redag/runtime/release_thread_test.cpp
-  redag/trace/flight_recorder_test.cpp
-  redag/trace/output_file_test.cpp
   redag_analysis/analyze/examples_test.cpp
   redag_analysis/core/waiting_test.cpp
   redag_analysis/many_workers/dag_shapes_test.cpp

@@ -82,7 +82,7 @@ class Page:
         self.folder, self.tools = folder, tools
         for name in "workloads", "experiments", "examples":
             (folder / name).symlink_to(source / name)
-        path = os.pathsep.join([str(tools.bin), str(tools.program.parent), os.environ["PATH"]])
+        path = os.pathsep.join([str(tools.program.parent), os.environ["PATH"]])
         self.environment = {**os.environ, "PATH": path, "CMAKE_PREFIX_PATH": str(tools.prefix), "CXX": tools.cxx,
                             "PKG_CONFIG_PATH": str(tools.pkgconfig), "NO_COLOR": "1", "HOME": str(folder)}
         # A library that is found there at run time, as an installed one is.
@@ -176,13 +176,6 @@ class Tools:
                     if (folder / folder.name).is_dir()]
         if self.ros:
             self.ros += [f"-I{source / 'redag_rclcpp' / 'include'}", f"-I{self.prefix / 'include' / 'redag-internal'}"]
-        self.bin = scratch / "bin"
-        self.bin.mkdir()
-        # A static library, which only this build installs, needs what it is built on.
-        if not list(self.pkgconfig.parent.glob("libredag.so*")):
-            wrapper = self.bin / "pkg-config"
-            wrapper.write_text('#!/bin/sh\nPATH=${PATH#*:} exec pkg-config --static "$@"\n')
-            wrapper.chmod(0o755)
 
 
 def main():

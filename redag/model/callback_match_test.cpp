@@ -15,8 +15,8 @@ namespace redag {
 namespace {
 
 using Kind = Callback::Kind;
-using testing::ElementsAre;
-using testing::IsEmpty;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
 
 CallbackId of(Kind kind, std::string node, std::string name = "") {
   return CallbackId{kind, std::move(node), std::move(name), 0, 0};
@@ -229,7 +229,7 @@ TEST(CallbackMatcher, NamesTheNearestCallback) {
                    of_timer("/nowhere")});
   CallbackMatcher matcher(workload);
   EXPECT_THAT(matcher.unmatched(),
-              testing::Contains("control.t0: no callback matches /ekf subscription /imu/dta"));  // nothing seen yet
+              ::testing::Contains("control.t0: no callback matches /ekf subscription /imu/dta"));  // nothing seen yet
   found(matcher, subscription("/ekf", "/odometry"));
   found(matcher, subscription("/ekf", "/imu/data"));
   found(matcher, timer("/pid", 5 * kMillisecond, 0));

@@ -60,14 +60,14 @@ TEST(Clusters, ADagNeedsToNameOneOfSeveral) {
   EXPECT_EQ(cluster_of(open->workload.platform, open->workload.dags[0]), std::nullopt);
 }
 
-struct Mistake {
+struct Refused {
   std::string text;
   const char *expected;  // part of the only error
 
-  friend std::ostream &operator<<(std::ostream &out, const Mistake &mistake) { return out << mistake.text; }
+  friend std::ostream &operator<<(std::ostream &out, const Refused &mistake) { return out << mistake.text; }
 };
 
-class ClustersRefuse : public ::testing::TestWithParam<Mistake> {};
+class ClustersRefuse : public ::testing::TestWithParam<Refused> {};
 
 TEST_P(ClustersRefuse, AtThePlace) {
   const Result<LoadedWorkload> loaded = parse_workload(GetParam().text, "w.yaml");
@@ -81,34 +81,34 @@ TEST_P(ClustersRefuse, AtThePlace) {
 INSTANTIATE_TEST_SUITE_P(
     Files, ClustersRefuse,
     ::testing::Values(
-        Mistake{"platform: {workers: 2, clusters: [{name: a}]}\n" + dags({""}),
+        Refused{"platform: {workers: 2, clusters: [{name: a}]}\n" + dags({""}),
                 "w.yaml:1:21: error: platform has both 'workers' and 'clusters' (each cluster has workers of its own"},
-        Mistake{"platform: {cpus: 0-3, clusters: [{name: a}]}\n" + dags({""}),
+        Refused{"platform: {cpus: 0-3, clusters: [{name: a}]}\n" + dags({""}),
                 "1:12: error: unknown key 'cpus' in platform"},
-        Mistake{"platform: {clusters: []}\n" + dags({""}), "1:22: error: clusters is an empty list"},
-        Mistake{"platform: {clusters: left}\n" + dags({", cluster: left"}), "1:22: error: clusters must be a list"},
-        Mistake{"platform: {clusters: [left]}\n" + dags({", cluster: left"}),
+        Refused{"platform: {clusters: []}\n" + dags({""}), "1:22: error: clusters is an empty list"},
+        Refused{"platform: {clusters: left}\n" + dags({", cluster: left"}), "1:22: error: clusters must be a list"},
+        Refused{"platform: {clusters: [left]}\n" + dags({", cluster: left"}),
                 "1:23: error: a cluster must be a map of name"},
-        Mistake{one_cluster("workers: 2"), "1:23: error: a cluster has no name"},
-        Mistake{one_cluster("name: a, workers: 0"), "1:42: error: workers must be a whole number from 1 to 4096"},
-        Mistake{one_cluster("name: a, cpus: all"), "1:39: error: cpus must be a list of processors such as 0-3"},
-        Mistake{one_cluster("name: a, cpus: []"), "1:39: error: cpus must be a list of processors"},
-        Mistake{one_cluster("name: a, cpus: 4-2"), "1:39: error: cpus must be a list of processors"},
-        Mistake{"platform: {clusters: [{name: a}, {name: a}]}\n" + dags({", cluster: a"}),
+        Refused{one_cluster("workers: 2"), "1:23: error: a cluster has no name"},
+        Refused{one_cluster("name: a, workers: 0"), "1:42: error: workers must be a whole number from 1 to 4096"},
+        Refused{one_cluster("name: a, cpus: all"), "1:39: error: cpus must be a list of processors such as 0-3"},
+        Refused{one_cluster("name: a, cpus: []"), "1:39: error: cpus must be a list of processors"},
+        Refused{one_cluster("name: a, cpus: 4-2"), "1:39: error: cpus must be a list of processors"},
+        Refused{"platform: {clusters: [{name: a}, {name: a}]}\n" + dags({", cluster: a"}),
                 "1:34: error: the name 'a' is used by another cluster"},
-        Mistake{"platform: {clusters: [{name: a, cpus: 0-3}, {name: b, cpus: 3-4}]}\n" +
+        Refused{"platform: {clusters: [{name: a, cpus: 0-3}, {name: b, cpus: 3-4}]}\n" +
                     dags({", cluster: a", ", cluster: b"}),
                 "1:45: error: processor 3 of cluster 'b' is also one of cluster 'a' (clusters share no processors)"},
-        Mistake{
+        Refused{
             "platform: {clusters: [{name: a, workers: 4096}, {name: b}]}\n" + dags({", cluster: a", ", cluster: b"}),
             "1:22: error: the clusters have 4097 workers; together at most 4096 are allowed"},
-        Mistake{kTwo + dags({", cluster: left", ", cluster: right", ""}),
+        Refused{kTwo + dags({", cluster: left", ", cluster: right", ""}),
                 "w.yaml:5:5: error: DAG 'd2' has no cluster (add 'cluster:' with one of left, right)"},
-        Mistake{kTwo + dags({", cluster: left", ", cluster: rigth", ", cluster: right"}),
+        Refused{kTwo + dags({", cluster: left", ", cluster: rigth", ", cluster: right"}),
                 "w.yaml:4:25: error: there is no cluster 'rigth', which DAG 'd1' names (choose one of left, right)"},
-        Mistake{dags({", cluster: left"}),
+        Refused{dags({", cluster: left"}),
                 "w.yaml:2:25: error: DAG 'd0' names a cluster, but the platform has no clusters"},
-        Mistake{
+        Refused{
             std::string(kTwo) +
                 "dags:\n"
                 "  - {name: a, cluster: left, period: 1s, tasks: [{name: t, wcet: 1ms, group: bus}]}\n"

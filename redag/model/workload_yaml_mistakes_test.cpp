@@ -34,7 +34,7 @@ struct Mistake {
   }
 };
 
-class ParseWorkloadRefuses : public testing::TestWithParam<Mistake> {};
+class ParseWorkloadRefuses : public ::testing::TestWithParam<Mistake> {};
 
 TEST_P(ParseWorkloadRefuses, AtThePlace) {
   const Result<LoadedWorkload> loaded = parse_workload(GetParam().text, "w.yaml");
@@ -49,7 +49,7 @@ TEST_P(ParseWorkloadRefuses, AtThePlace) {
 
 INSTANTIATE_TEST_SUITE_P(
     Text, ParseWorkloadRefuses,
-    testing::Values(
+    ::testing::Values(
         Mistake{"", {"w.yaml: error: the file has no workload"}},
         Mistake{"# only a comment\n", {"the file has no workload"}},
         Mistake{"- a\n", {"w.yaml:1:1: error: a workload must be a map"}},
@@ -97,7 +97,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 INSTANTIATE_TEST_SUITE_P(
     Keys, ParseWorkloadRefuses,
-    testing::Values(
+    ::testing::Values(
         Mistake{"nam: x\ndags: []\n",
                 {"w.yaml:1:1: error: unknown key 'nam' in a workload (did you mean 'name'?)",
                  "w.yaml:2:7: error: the workload has no DAGs"}},
@@ -136,7 +136,7 @@ std::string with(const char *keys) { return tasks({fmt::format("{{name: t, {}}}"
 
 INSTANTIATE_TEST_SUITE_P(
     Values, ParseWorkloadRefuses,
-    testing::Values(
+    ::testing::Values(
         Mistake{with("wcet: 1, period: 1s"), {"w.yaml:4:23: error: wcet: '1' is not a duration: it has no unit"}},
         Mistake{with("wcet: , period: 1s"), {"error: wcet must be a duration such as 5ms, not nothing"}},
         Mistake{with("wcet: [1ms], period: 1s"),
@@ -214,7 +214,7 @@ std::string with_callback(const char *callback) {
 
 INSTANTIATE_TEST_SUITE_P(
     Callbacks, ParseWorkloadRefuses,
-    testing::Values(
+    ::testing::Values(
         Mistake{with_callback("/ekf"),
                 {"w.yaml:4:50: error: callback must be a map of node, timer, subscription, service, client, action, "
                  "waitable, not '/ekf'"}},
@@ -271,7 +271,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 INSTANTIATE_TEST_SUITE_P(
     Graphs, ParseWorkloadRefuses,
-    testing::Values(
+    ::testing::Values(
         Mistake{
             tasks({"{name: lidar, wcet: 1ms, period: 1s}", "{name: b, wcet: 1ms, activation: data, after: [lidra]}"}),
             {"w.yaml:5:54: error: there is no task 'lidra' in DAG 'd' (did you mean 'lidar'?)"}},

@@ -24,7 +24,7 @@ namespace {
 
 using sched::Outcome;
 
-constexpr int kEnoughToBeExpectedShort = 200;  // eight in a row suffice, but a loaded machine interrupts some
+constexpr int kEnoughShortJobs = 200;  // eight in a row suffice, but a loaded machine interrupts some
 
 // An engine for independent tasks on one worker; the first one is the most urgent.
 class ShortJobs : public ::testing::TestWithParam<PreemptionMode> {
@@ -67,7 +67,7 @@ TEST_P(ShortJobs, OneThatSleepsAllTheSameIsNotChargedForIt) {
     if (sleeps) std::this_thread::sleep_for(std::chrono::milliseconds(50));
     return Outcome::Finished;
   }});
-  run(0, kEnoughToBeExpectedShort);
+  run(0, kEnoughShortJobs);
   sleeps = true;
   run(0, 3);
   EXPECT_LT(engine_->usage(TaskId(0)).longest, 25 * kMillisecond);
@@ -84,7 +84,7 @@ TEST_P(ShortJobs, OneThatComputesAllTheSameIsChargedForIt) {
     }
     return Outcome::Finished;
   }});
-  run(0, kEnoughToBeExpectedShort);
+  run(0, kEnoughShortJobs);
   EXPECT_GT(engine_->usage(TaskId(0)).total, 0);
   demand = 2 * kMillisecond;
   run(0);
@@ -132,7 +132,7 @@ TEST_P(ShortJobsWithPriorities, AThreadThatKeptItsPriorityLosesItToAJobInBetween
            EXPECT_EQ(fifo_priority(pthread_self()), band_.of_level(2));
            return Outcome::Finished;
          }});
-  run(2, kEnoughToBeExpectedShort);
+  run(2, kEnoughShortJobs);
   waits = true;
   run(0);
   run(2);

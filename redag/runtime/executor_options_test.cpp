@@ -15,9 +15,9 @@ namespace redag::runtime {
 namespace {
 
 using namespace std::chrono_literals;
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::Not;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 ExecutorOptions without_preemption() {
   ExecutorOptions options;

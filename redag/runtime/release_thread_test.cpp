@@ -15,7 +15,7 @@
 namespace redag::runtime {
 namespace {
 
-constexpr Duration kLong = 3600 * kSecond;
+constexpr Duration kLongBody = 3600 * kSecond;
 constexpr Duration kWhile = 20 * kMillisecond;  // in which nothing may happen
 
 // One release at a time, which the test makes due.
@@ -41,7 +41,7 @@ class ReleaseThreadTest : public ::testing::Test {
 TEST_F(ReleaseThreadTest, ReleasesWithoutALeader) {
   due = monotonic_now() + kMillisecond;
   ASSERT_TRUE(thread.start({}));
-  EXPECT_TRUE(is_released_within(kLong));
+  EXPECT_TRUE(is_released_within(kLongBody));
   EXPECT_FALSE(by_leader);
 }
 
@@ -60,7 +60,7 @@ TEST_F(ReleaseThreadTest, HasThePriorityThatItIsGiven) {
   EXPECT_EQ(seen, 2);
   EXPECT_TRUE(raised.set_priority(3));
   raised.changed();
-  const Time end = monotonic_now() + kLong;
+  const Time end = monotonic_now() + kLongBody;
   while (seen != 3 && monotonic_now() < end) std::this_thread::yield();
   EXPECT_EQ(seen, 3);
   raised.stop();
@@ -85,7 +85,7 @@ TEST_F(ReleaseThreadTest, ReleasesOnceTheLeaderHasAJob) {
   due = monotonic_now() + kMillisecond;
   EXPECT_EQ(thread.lead(kNever), due);
   thread.follow();
-  EXPECT_TRUE(is_released_within(kLong));
+  EXPECT_TRUE(is_released_within(kLongBody));
   EXPECT_FALSE(by_leader);
 }
 
@@ -93,17 +93,17 @@ TEST_F(ReleaseThreadTest, ReleasesOnceItsPatienceIsOver) {
   ASSERT_TRUE(thread.start({}));
   due = monotonic_now() + kMillisecond;
   EXPECT_EQ(thread.lead(kMillisecond), due);
-  EXPECT_TRUE(is_released_within(kLong));
+  EXPECT_TRUE(is_released_within(kLongBody));
   EXPECT_FALSE(by_leader);
 }
 
 TEST_F(ReleaseThreadTest, ReleasesWhatComesBeforeTheLeadersTime) {
   ASSERT_TRUE(thread.start({}));
-  due = monotonic_now() + kLong;
+  due = monotonic_now() + kLongBody;
   EXPECT_EQ(thread.lead(kNever), due);
   due = monotonic_now() + kMillisecond;
   thread.changed();
-  EXPECT_TRUE(is_released_within(kLong));
+  EXPECT_TRUE(is_released_within(kLongBody));
   EXPECT_FALSE(by_leader);
 }
 
@@ -112,7 +112,7 @@ TEST_F(ReleaseThreadTest, ReleasesForALeaderThatExpectedNothing) {
   EXPECT_EQ(thread.lead(kNever), kNever);
   due = monotonic_now() + kMillisecond;
   thread.changed();
-  EXPECT_TRUE(is_released_within(kLong));
+  EXPECT_TRUE(is_released_within(kLongBody));
 }
 
 TEST_F(ReleaseThreadTest, WhatIsDueAtTheStopIsReleasedAndNothingAfterIt) {

@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t kBlockBytes = 4096;
 constexpr std::size_t kBlockEvents = 127;
 
-RunInfo example() {
+RunInfo flight_example() {
   RunInfo info;
   info.workload = testing::make_workload({testing::make_dag("control", {{"imu", 5, 1}, {"ekf", 0, 1, {0}}})}, 2);
   info.executor = "redag";
@@ -49,7 +49,7 @@ class FlightRecord : public ::testing::Test {
   void TearDown() override { fs::remove_all(folder_); }
 
   FlightRecorder create(const FlightOptions &options = {}) {
-    Result<FlightRecorder> recorder = FlightRecorder::create(folder_, example(), options);
+    Result<FlightRecorder> recorder = FlightRecorder::create(folder_, flight_example(), options);
     EXPECT_TRUE(recorder) << (recorder ? "" : to_string(recorder.error()));
     return std::move(*recorder);
   }
@@ -86,7 +86,7 @@ TEST_F(FlightRecord, GivesBackWhatWasAppended) {
   const std::size_t all = 2 * kBlockEvents + 6;
   EXPECT_EQ(found.trace.events, events(0, all - 1)) << "all but the last instant";
   EXPECT_EQ(found.trace.info.end, static_cast<Time>(all - 1));
-  EXPECT_EQ(found.trace.info.workload, example().workload);
+  EXPECT_EQ(found.trace.info.workload, flight_example().workload);
   EXPECT_EQ(found.trace.info.lost_events, 3U);
   EXPECT_EQ(found.overwritten, 0U);
   EXPECT_EQ(found.damaged, 0U);
@@ -158,7 +158,7 @@ TEST_F(FlightRecord, WithoutEventsIsARunWithout) {
 
 TEST_F(FlightRecord, AnotherDescriptionReplacesTheFirst) {
   FlightRecorder recorder = create();
-  RunInfo larger = example();
+  RunInfo larger = flight_example();
   larger.workload.dags.push_back(testing::make_dag("map", {{"lidar", 100, 20}}));
   ASSERT_TRUE(recorder.describe(larger));
   std::vector<JobEvent> of_both = events(0, 3);
@@ -172,7 +172,7 @@ TEST_F(FlightRecord, AnotherDescriptionReplacesTheFirst) {
 // A driver whose tasks come and go uses other ids than the workload that describes the run at its end.
 TEST_F(FlightRecord, IdsOfTheDriverBecomePositions) {
   FlightRecorder recorder = create();
-  ASSERT_TRUE(recorder.describe(example(), std::vector<std::uint32_t>{1, 0, 1}));
+  ASSERT_TRUE(recorder.describe(flight_example(), std::vector<std::uint32_t>{1, 0, 1}));
   std::vector<JobEvent> by_id = events(0, 4);
   by_id[2].task = TaskId(2);
   ASSERT_TRUE(recorder.append(by_id, 0));
@@ -188,7 +188,7 @@ TEST_F(FlightRecord, IdsOfTheDriverBecomePositions) {
 
 TEST_F(FlightRecord, IsNotWrittenOverAnother) {
   static_cast<void>(create());
-  const Result<FlightRecorder> second = FlightRecorder::create(folder_, example());
+  const Result<FlightRecorder> second = FlightRecorder::create(folder_, flight_example());
   ASSERT_FALSE(second);
   EXPECT_NE(to_string(second.error()).find("redag recover"), std::string::npos);
 }
