@@ -58,7 +58,7 @@ lint: ## layers, references, commits, module diagram, formatting, locks, and cla
 	tools/module_diagram --check
 	tools/format --check
 	cmake --preset dev
-	tools/thread_safety
+	tools/check_sources
 	tools/tidy
 
 format: ## rewrite all C++ files as .clang-format says

@@ -38,7 +38,7 @@ import xml.etree.ElementTree
 MARKS = ("not run", "run with", "compiled with", "file")
 # The README is the front page and has no marks. By a text of the block.
 README = {
-    "make demo": ("not run", "builds everything; .ci/run executes the targets"),
+    "make demo": ("not run", "builds everything; .ci/run runs both commands as they stand here"),
     "git clone <this repository>": ("not run", "needs ROS 2; tools/test_documented_build runs it"),
     "redag_rclcpp::ReDAGExecutor executor;": ("compiled with", "struct Robot : rclcpp::Node { Robot() : Node(\"robot\") {} };"),
     "read_imu()": ("compiled with", "void read_imu(); void actuate();"),
@@ -137,6 +137,22 @@ class Page:
     def xml(self, block):
         xml.etree.ElementTree.fromstring(block.text)
 
+    def confirm(self, block):
+        """Fails if the reason for not running a block names a check that is not there, or that runs something else."""
+        for name in re.findall(r"[\w.-]*(?:/[\w.-]+)+", block.marks["not run"]):
+            check = self.tools.source / name.rstrip(".")
+            if not check.is_file():
+                raise Wrong(f"the reason names {name}, which is not there")
+            if block.language != "sh" or check.suffix not in ("", ".py"):
+                continue
+            text = check.read_text(encoding="utf-8")
+            if "README.md" in text or "docs/ros2.md" in text:
+                continue  # reads the commands from the page
+            commands = [words for line in block.text.splitlines() if (words := line.split("#")[0].removeprefix("sudo ").split())]
+            wanted = {words[1] if words[0] == "redag" and len(words) > 1 else pathlib.Path(words[0]).name for words in commands}
+            if not any(word in text for word in wanted):
+                raise Wrong(f"the reason names {name}, which runs none of {', '.join(sorted(wanted))}")
+
     def execute(self, block):
         """Returns what was done with the block."""
         if block.language in NO_CODE:
@@ -144,6 +160,7 @@ class Page:
         if block.language not in ("sh", "console", "cpp", "yaml", "cmake", "xml"):
             raise Wrong(f"no rule for the language {block.language!r}")
         if "not run" in block.marks:
+            self.confirm(block)
             if block.language == "sh":
                 self.call('bash -n <<< "$1"', arguments=[block.text.replace("<this repository>", "repository")])
             return "not run"
@@ -166,7 +183,7 @@ class Tools:
     """The program, and an installation of the build."""
 
     def __init__(self, program, source, build, cxx, cmake, scratch):
-        self.program, self.cxx, self.prefix = program, cxx, scratch / "prefix"
+        self.program, self.source, self.cxx, self.prefix = program, source, cxx, scratch / "prefix"
         subprocess.run([cmake, "--install", build, "--prefix", self.prefix], check=True, stdout=subprocess.DEVNULL)
         self.pkgconfig = next(self.prefix.rglob("redag.pc")).parent
         # Headers of ROS 2, which the compiler takes as the system's, and of this repository's package for it.

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Annotations for clang's -Wthread-safety: which mutex guards a member, and which one a function needs. Empty for other
-// compilers. tools/thread_safety (make lint) checks them.
+// compilers. tools/check_sources (make lint) checks them.
 // https://clang.llvm.org/docs/ThreadSafetyAnalysis.html
 #pragma once
 
