@@ -138,5 +138,5 @@ site: ## the documentation site in results/site
 	tools/build_site build/release/bin/redag results/site
 
 clean: ## remove what the targets above built; results/ stays
-	rm -rf build/dev build/test build/release build/bench build/asan-ubsan build/tsan build/coverage build/mutate build/fuzz build/package build/colcon build/reference
+	rm -rf build/dev build/test build/release build/asan-ubsan build/tsan build/coverage build/mutate build/fuzz build/package build/colcon build/reference
 	git worktree prune

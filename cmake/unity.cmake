@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-# Builds for one run of the tests compile a dozen sources as one (CMAKE_UNITY_BUILD). It takes about a third of the
-# time, most of which goes to templates that the sources share. The other builds compile each source alone, which shows
-# missing includes and keeps rebuilds short. Included last, when all targets are defined.
+# Most builds compile two dozen sources as one (CMAKE_UNITY_BUILD). It takes about a third of the time, most of which goes
+# to templates that the sources share. The preset `dev` compiles each source alone, which keeps rebuilds short;
+# tools/check_sources finds missing includes. Included last, when all targets are defined.
 
 # These are compiled alone: another source of their target has an anonymous namespace with the same name in it.
 set(alone
