@@ -38,12 +38,12 @@ int main() {
   for (const TaskStats &task : stats.tasks) {
     std::printf("%-14s missed %2llu of %2llu, response p50 %6.3f p99 %6.3f longest %6.3f ms, lateness p99 %7.3f ms\n",
                 task.task.c_str(), static_cast<unsigned long long>(task.misses()),
-                static_cast<unsigned long long>(task.jobs.released), in_ms(task.response.percentile(0.5)),
-                in_ms(task.response.percentile(0.99)), in_ms(task.response.longest()), in_ms(task.lateness(0.99)));
+                static_cast<unsigned long long>(task.jobs.released), in_ms(task.response.quantile(0.5)),
+                in_ms(task.response.quantile(0.99)), in_ms(task.response.longest()), in_ms(task.lateness(0.99)));
   }
   for (const SinkStats &sink : stats.sinks) {
     std::printf("%s answers end to end within %.3f ms (p99 %.3f ms); %llu answers were later than %.0f ms\n",
-                stats.dag.c_str(), in_ms(sink.end_to_end.longest()), in_ms(sink.end_to_end.percentile(0.99)),
+                stats.dag.c_str(), in_ms(sink.end_to_end.longest()), in_ms(sink.end_to_end.quantile(0.99)),
                 static_cast<unsigned long long>(sink.late), in_ms(stats.deadline));
   }
   std::puts(stats.met_every_deadline() ? "every deadline was met" : "not every deadline was met");

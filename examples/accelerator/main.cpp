@@ -103,7 +103,7 @@ int run(const Named &named, std::chrono::seconds duration) {
   std::printf(
       "%s, %s: camera %llu frames, median %.2f ms, p99 %.2f ms, longest %.2f ms; control late %llu times of %llu\n",
       accelerator.name().c_str(), named.text, static_cast<unsigned long long>(detect.jobs.finished),
-      ms(detect.response.percentile(0.5)), ms(detect.response.percentile(0.99)), ms(detect.response.longest()),
+      ms(detect.response.quantile(0.5)), ms(detect.response.quantile(0.99)), ms(detect.response.longest()),
       static_cast<unsigned long long>(step.late), static_cast<unsigned long long>(step.jobs.finished));
   return detect.jobs.finished > 0 ? 0 : 1;
 }

@@ -8,8 +8,10 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <cstdint>
 
+#include "redag/base/check.hpp"
 #include "redag/base/log_buckets.hpp"
 #include "redag/base/time.hpp"
 
@@ -33,9 +35,12 @@ class HistogramCounts {
     return total;
   }
 
-  /// Returns the smallest bound that at least `share` of the values do not exceed; 0 without values.
-  [[nodiscard]] Duration percentile(double share) const noexcept {
-    const auto wanted = static_cast<std::uint64_t>(share * static_cast<double>(total()));
+  /// Returns the smallest bound that at least `share` of the values do not exceed; 0 without values. `share` is from 0
+  /// to 1.
+  [[nodiscard]] Duration quantile(double share) const noexcept {
+    REDAG_CHECK(share >= 0 && share <= 1, "a share of the values is from 0 to 1");
+    constexpr double kRounding = 1e-6;  // 0.07 * 100 is more than 7
+    const auto wanted = static_cast<std::uint64_t>(std::ceil(share * static_cast<double>(total()) - kRounding));
     std::uint64_t seen = 0;
     for (std::size_t i = 0; i < kBuckets; ++i) {
       seen += buckets_[i];
@@ -93,8 +98,8 @@ class Histogram {
   }
 
   [[nodiscard]] Duration longest() const noexcept { return longest_.load(std::memory_order_relaxed); }
-  /// As HistogramCounts::percentile().
-  [[nodiscard]] Duration percentile(double share) const noexcept { return counts().percentile(share); }
+  /// As HistogramCounts::quantile().
+  [[nodiscard]] Duration quantile(double share) const noexcept { return counts().quantile(share); }
 
  private:
   std::array<std::atomic<std::uint32_t>, HistogramCounts::kBuckets> buckets_{};

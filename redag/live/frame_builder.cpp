@@ -13,12 +13,12 @@ namespace redag::live {
 namespace {
 
 void set_response(page::Figures &figures, const HistogramCounts &all, const HistogramCounts &recent) {
-  figures.response_p50 = all.percentile(0.5);
-  figures.response_p99 = all.percentile(0.99);
+  figures.response_p50 = all.quantile(0.5);
+  figures.response_p99 = all.quantile(0.99);
   figures.response_max = all.longest();
-  figures.recent_p50 = recent.percentile(0.5);
-  figures.recent_p99 = recent.percentile(0.99);
-  figures.recent_max = recent.percentile(1.0);
+  figures.recent_p50 = recent.quantile(0.5);
+  figures.recent_p99 = recent.quantile(0.99);
+  figures.recent_max = recent.quantile(1.0);
 }
 
 void add(page::Figures &sum, const page::Figures &task) {

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <limits>
 #include <map>
 #include <mutex>
 #include <stdexcept>
@@ -109,8 +110,18 @@ TEST(ExecutorStats, MissesAreCountedWithoutMeasuring) {
   EXPECT_EQ(stats.tasks[0].misses(), 1U);
   EXPECT_EQ(stats.sinks[0].late, 1U);
   EXPECT_EQ(stats.tasks[0].response.count(), 0U);
-  EXPECT_EQ(stats.tasks[0].response.percentile(0.99), 0);
+  EXPECT_EQ(stats.tasks[0].response.quantile(0.99), 0);
   EXPECT_EQ(stats.tasks[0].lateness(0.99), 0);
+}
+
+TEST(ExecutorStats, AShareIsFromZeroToOne) {
+  const TaskStats empty;
+  EXPECT_EQ(empty.response.quantile(0), 0);
+  EXPECT_EQ(empty.response.quantile(1), 0);
+  for (const double wrong : {99.0, -0.01, std::numeric_limits<double>::quiet_NaN()}) {
+    EXPECT_THROW(static_cast<void>(empty.response.quantile(wrong)), std::invalid_argument) << wrong;
+    EXPECT_THROW(static_cast<void>(empty.lateness(wrong)), std::invalid_argument) << wrong;
+  }
 }
 
 TEST(ExecutorStats, SkippedAndAbortedJobsAreMissesAndJobsInTimeAreNot) {

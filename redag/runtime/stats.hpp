@@ -29,8 +29,9 @@ class Distribution {
   [[nodiscard]] std::uint64_t count() const;
   /// Exact; 0 if empty.
   [[nodiscard]] Duration longest() const;
-  /// The duration that `share` (0 to 1) of the values do not exceed: exact to 1/8 above, never below. 0 if empty.
-  [[nodiscard]] Duration percentile(double share) const;
+  /// The duration that `share` of the values do not exceed: quantile(0.99) is the 99th percentile. Exact to 1/8 above,
+  /// never below. 0 if empty. Throws std::invalid_argument if `share` is not from 0 to 1.
+  [[nodiscard]] Duration quantile(double share) const;
 
  private:
   std::shared_ptr<const Content> content_;  // null: empty
@@ -59,9 +60,10 @@ struct TaskStats {
   /// Jobs that finished late, were skipped, or were aborted although they had data. Jobs in flight do not count yet.
   [[nodiscard]] std::uint64_t misses() const { return late + jobs.lost(); }
   /// The lateness (finish - deadline) that `share` of the finished jobs do not exceed; negative: they were in time. As
-  /// exact as the response. 0 if `response` is empty.
+  /// exact as the response. 0 if `response` is empty. Throws as Distribution::quantile().
   [[nodiscard]] Duration lateness(double share) const {
-    return response.count() == 0 ? 0 : response.percentile(share) - deadline;
+    const Duration longest = response.quantile(share);
+    return response.count() == 0 ? 0 : longest - deadline;
   }
 };
 

@@ -171,11 +171,11 @@ std::vector<CallbackStats> TaskTable::stats(const redag::runtime::Engine &engine
     stats.jobs = figures.jobs;
     stats.waits = figures.most_waits;
     stats.misses = callback.late() + stats.jobs.lost();
-    stats.response_p50 = callback.response().percentile(0.5);
-    stats.response_p99 = callback.response().percentile(0.99);
+    stats.response_p50 = callback.response().quantile(0.5);
+    stats.response_p99 = callback.response().quantile(0.99);
     stats.response_max = callback.response().longest();
-    stats.execution_p50 = callback.execution().percentile(0.5);
-    stats.execution_p99 = callback.execution().percentile(0.99);
+    stats.execution_p50 = callback.execution().quantile(0.5);
+    stats.execution_p99 = callback.execution().quantile(0.99);
     stats.execution_max = callback.execution().longest();
   }
   std::vector<CallbackStats> result;
