@@ -32,7 +32,12 @@ inline constexpr Duration kMaxDuration = std::numeric_limits<Duration>::max() / 
 /// has no unit, does not fit, or is not a whole number of nanoseconds. Reads a leading "-", for the caller to reject.
 [[nodiscard]] Result<Duration> parse_duration(std::string_view text);
 
-/// Returns the shortest text that parse_duration() reads back as the same value: 1'500'000 -> "1.5ms".
+/// Reads a rate, "30Hz" or "1.5kHz", as its period to the nearest nanosecond: 33'333'333. Errors: no unit, a rate that
+/// is not above 0, a period below 1 ns or above kMaxDuration.
+[[nodiscard]] Result<Duration> parse_rate(std::string_view text);
+
+/// Returns a text that parse_duration() reads back as the same value, in the largest unit (ns to s) that the duration
+/// reaches: 1'500'000 -> "1.5ms", 200'000 -> "200us".
 [[nodiscard]] std::string format_duration(Duration duration);
 
 /// Formats a duration for people, with three or four significant digits and a suitable unit: 12'345'678 -> "12.35ms".

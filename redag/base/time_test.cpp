@@ -62,12 +62,49 @@ RC_GTEST_PROP(FormatDuration, ParsesBackToTheSameValue, ()) {
   RC_ASSERT(parse_duration(format_duration(value)) == value);
 }
 
+TEST(ParseDuration, ShowsThePeriodOfARate) {
+  const Result<Duration> result = parse_duration("100Hz");
+  ASSERT_FALSE(result);
+  EXPECT_EQ(to_string(result.error()), "error: '100Hz' is not a duration: it is a rate (write its period, 10ms)");
+}
+
+TEST(ParseRate, GivesThePeriodToTheNearestNanosecond) {
+  EXPECT_EQ(parse_rate("400Hz"), 2'500'000);
+  EXPECT_EQ(parse_rate("1 kHz"), kMillisecond);
+  EXPECT_EQ(parse_rate("0.5Hz"), 2 * kSecond);
+  EXPECT_EQ(parse_rate("30Hz"), 33'333'333);
+  EXPECT_EQ(parse_rate("60Hz"), 16'666'667);
+  EXPECT_EQ(parse_rate("29.97Hz"), 33'366'700);
+  EXPECT_EQ(parse_rate("1000000kHz"), 1);
+}
+
+TEST(ParseRate, RefusesWithAReason) {
+  for (const auto &[text, why] :
+       {Refused{"30", "it has no unit"}, Refused{"Hz", "does not begin with a number"}, Refused{"0Hz", "greater than"},
+        Refused{"-3Hz", "does not begin"}, Refused{"5ms", "it is a duration"}, Refused{"30hz", "unknown unit 'hz'"},
+        Refused{"3000000kHz", "below 1ns"}, Refused{"0.0000000001Hz", "longer than"}}) {
+    const Result<Duration> result = parse_rate(text);
+    ASSERT_FALSE(result) << text;
+    EXPECT_NE(to_string(result.error()).find(why), std::string::npos) << to_string(result.error());
+  }
+}
+
+RC_GTEST_PROP(ParseRate, NeverCrashesOnText, (const std::string &text)) {
+  const Result<Duration> period = parse_rate(text);
+  RC_ASSERT(!period || (*period > 0 && *period <= kMaxDuration));
+}
+
 RC_GTEST_PROP(ParseDuration, NeverCrashesOnText, (const std::string &text)) {
   const Result<Duration> result = parse_duration(text);
   RC_ASSERT(result.has_value() || result.error().size() == 1);
 }
 
-TEST(FormatDuration, IsShort) {
+TEST(FormatDuration, UsesTheLargestUnitThatTheDurationReaches) {
+  EXPECT_EQ(format_duration(200 * kMicrosecond), "200us");
+  EXPECT_EQ(format_duration(33'333'333), "33.333333ms");
+  EXPECT_EQ(format_duration(1'234'567), "1.234567ms");
+  EXPECT_EQ(format_duration(90 * kSecond), "90s");
+  EXPECT_EQ(format_duration(-500), "-500ns");
   EXPECT_EQ(format_duration(0), "0s");
   EXPECT_EQ(format_duration(1'500'000), "1.5ms");
   EXPECT_EQ(format_duration(20 * kMillisecond), "20ms");

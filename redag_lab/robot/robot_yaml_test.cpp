@@ -194,7 +194,7 @@ TEST(RobotYaml, AReservationIsABudgetInAPeriod) {
   EXPECT_EQ(with("{budget: 2ms}"),
             "cart.yaml:17:56: error: the reservation has no 'period' (write {budget: 2ms, period: 10ms})");
   EXPECT_EQ(with("{budget: 20ms, period: 10ms}"),
-            "cart.yaml:17:65: error: the budget of a reservation must be between 1024ns and its period 10ms");
+            "cart.yaml:17:65: error: the budget of a reservation must be between 1.024us and its period 10ms");
   EXPECT_EQ(with("{budget: 2us, period: 10us}"),
             "cart.yaml:17:78: error: the period of a reservation must be between 0.1ms and 4s");
   EXPECT_EQ(with("{budget: 2ms, period: 10ms, tick: 20ms}"),

@@ -66,7 +66,7 @@ class Diff(Case):
     def test_what_else_differs(self):
         simulated = self.results("simulated")
         slowed = self.results("slowed", "--overhead-dispatch", "100us")
-        self.assertIn("caution: the sides were charged different overheads: none, and release 0s, dispatch 0.1ms, preempt 0s",
+        self.assertIn("caution: the sides were charged different overheads: none, and release 0s, dispatch 100us, preempt 0s",
                       self.expect(redag("diff", simulated, slowed), 0).stdout)
         on_threads = self.folder / "threads"
         self.expect(redag("run", self.cart, "--duration", "500ms", "--events", "jsonl", "--out", on_threads), 0)
