@@ -3,7 +3,9 @@
 
 #include "redag/model/workload_yaml_tree.hpp"
 
+#include <algorithm>
 #include <new>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
@@ -59,6 +61,39 @@ Place place_at(std::string_view text, std::size_t end) {
   return place;
 }
 
+std::string_view line_of(std::string_view text, int number) {
+  for (; number > 1; --number) {
+    const std::size_t end = text.find('\n');
+    if (end == std::string_view::npos) return {};
+    text.remove_prefix(end + 1);
+  }
+  text = text.substr(0, text.find('\n'));
+  if (text.ends_with('\r')) text.remove_suffix(1);
+  return text;
+}
+
+/// Explains what the eye cannot see in a line: a tab in its indentation, or a character that only looks like a space.
+std::optional<Rejected> unseen_mistake(std::string_view text, int number) {
+  const std::string_view line = line_of(text, number);
+  const std::size_t begin = std::min(line.find_first_not_of(" \t"), line.size());
+  if (const std::size_t tab = line.substr(0, begin).find('\t'); tab != std::string_view::npos) {
+    std::string mended;
+    for (const char c : line.substr(0, begin)) mended += c == '\t' ? "  " : " ";
+    mended += line.substr(begin);
+    return Rejected{{number, static_cast<int>(tab) + 1},
+                    "a tab is in the indentation, where YAML takes only spaces",
+                    "write " + in_quotes(mended)};
+  }
+  const std::size_t at = find_odd_space(line);
+  if (at == std::string_view::npos) return std::nullopt;
+  const std::size_t length = utf8_length(line, at);
+  return Rejected{{number, place_at(line, at).column},
+                  fmt::format("U+{:04X} is here, which looks like a space or like nothing, and is part of the text",
+                              static_cast<std::uint32_t>(code_point(line.substr(at, length)))),
+                  fmt::format("write {}", in_quotes(std::string(line.substr(begin, at - begin)) + ' ' +
+                                                    std::string(line.substr(at + length))))};
+}
+
 /// libyaml's events of one text, which must outlive it.
 class EventReader {
  public:
@@ -86,6 +121,10 @@ class EventReader {
       return {place_at(text_, parser_.problem_offset), fmt::format("invalid YAML: {}", problem), ""};
     }
     const Place place = place_of(parser_.problem_mark);
+    if (parser_.context != nullptr) {
+      if (auto unseen = unseen_mistake(text_, place_of(parser_.context_mark).line)) return *std::move(unseen);
+    }
+    if (auto unseen = unseen_mistake(text_, place.line)) return *std::move(unseen);
     if (parser_.context == nullptr) return {place, fmt::format("invalid YAML: {}", problem), ""};
     const std::string_view context = parser_.context;
     const Place begin = place_of(parser_.context_mark);
@@ -104,6 +143,8 @@ class EventReader {
 
 class TreeBuilder {
  public:
+  explicit TreeBuilder(std::string_view text) : text_(text) {}
+
   /// Takes the events of one document, from its begin to its end.
   Node read(EventReader &reader) {
     Event event;
@@ -154,6 +195,11 @@ class TreeBuilder {
       add(Node::Kind::Null, event.start_mark);
       return;
     }
+    if (!quoted && find_odd_space(text) != std::string_view::npos) {
+      for (std::size_t line = event.start_mark.line; line <= event.end_mark.line; ++line) {
+        if (auto unseen = unseen_mistake(text_, static_cast<int>(line) + 1)) throw *std::move(unseen);
+      }
+    }
     Node &node = add(Node::Kind::Scalar, event.start_mark);
     node.text = text;
     node.quoted = quoted;
@@ -187,6 +233,7 @@ class TreeBuilder {
     open_.pop_back();
   }
 
+  std::string_view text_;
   Node root_;
   std::vector<Node *> open_;
 };
@@ -229,7 +276,7 @@ Node read_only_document(std::string_view text) {
   reader.next(event);  // the begin of the text
   reader.next(event);
   if (event.raw().type == YAML_STREAM_END_EVENT) return {};
-  Node root = TreeBuilder().read(reader);
+  Node root = TreeBuilder(text).read(reader);
   reader.next(event);
   if (event.raw().type == YAML_STREAM_END_EVENT) return root;
   reader.next(event);
@@ -255,6 +302,25 @@ Result<Node> parse(std::string_view text, const std::string &file) {
 
 bool is_null(std::string_view plain) {
   return plain.empty() || plain == "~" || plain == "null" || plain == "Null" || plain == "NULL";
+}
+
+std::size_t find_odd_space(std::string_view text) {
+  for (std::size_t i = 0; i < text.size();) {
+    if (static_cast<unsigned char>(text[i]) < 0x80) {
+      ++i;
+      continue;
+    }
+    const std::size_t length = utf8_length(text, i);
+    if (length == 0) return std::string_view::npos;
+    const char32_t code = code_point(text.substr(i, length));
+    const bool is_wide = code >= 0x2000 && code <= 0x200B;  // of several widths, or none
+    if (is_wide || code == 0xA0 || code == 0xAD || code == 0x1680 || code == 0x202F || code == 0x205F ||
+        code == 0x2060 || code == 0x3000) {
+      return i;
+    }
+    i += length;
+  }
+  return std::string_view::npos;
 }
 
 std::string describe(const Node &node) {

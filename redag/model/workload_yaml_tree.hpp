@@ -35,6 +35,10 @@ inline constexpr std::size_t kMaxDepth = 32;
 /// Returns true if an unquoted scalar with this text is a Null node.
 [[nodiscard]] bool is_null(std::string_view plain);
 
+/// Returns the place of the first character that looks like a space, or like nothing, and is none for YAML: a no-break
+/// space (U+00A0), for instance. npos if there is none. parse() refuses it in unquoted scalars.
+[[nodiscard]] std::size_t find_odd_space(std::string_view text);
+
 /// Describes a node for messages: "a map", "a list", "'5ms'".
 [[nodiscard]] std::string describe(const Node &node);
 

@@ -56,6 +56,7 @@ bool is_all_raw(std::string_view text) {
 
 /// True if YAML reads the text without quotes as it is. `in_line`: inside {} or [].
 bool is_plain(std::string_view text, bool in_line) {
+  if (find_odd_space(text) != std::string_view::npos) return false;
   if (is_null(text) || text.front() == ' ' || text.back() == ' ') return false;
   if (text.starts_with("---") || text.starts_with("...")) return false;
   if (contains(",[]{}#&*!|>'\"%@`", text.front())) return false;
