@@ -78,7 +78,9 @@ def robot_errors(document):
 
 
 def with_task(**changes):
-    return {"dags": [{"name": "d", "tasks": [{**TASK, **changes}]}]}
+    """A workload of one task with these values; ... removes a key."""
+    task = {key: value for key, value in {**TASK, **changes}.items() if value is not ...}
+    return {"dags": [{"name": "d", "tasks": [task]}]}
 
 
 class SchemaTest(unittest.TestCase):
@@ -123,6 +125,8 @@ class SchemaTest(unittest.TestCase):
             {"concurrency": 2},
             {"budget": "2ms", "on_budget": "skip_next"},
             {"wcet_low": "1ms"},
+            {"period": ..., "rate": "30Hz"},
+            {"period": ..., "rate": ".5 kHz"},
             *({"callback": {"node": "/n", **of}} for of in CALLBACKS),
         ):
             with self.subTest(changes=changes):
@@ -146,6 +150,8 @@ class SchemaTest(unittest.TestCase):
             {"concurrency": 1025},
             {"on_budget": "kill"},
             {"wcet_low": 1},
+            {"rate": "30Hz"},
+            *({"period": ..., "rate": rate} for rate in (30, "30", "0Hz", "0.0 kHz", "-1Hz", "10ms", "30hz")),
             *({"callback": callback} for callback in BAD_CALLBACKS),
         ):
             with self.subTest(changes=changes):
@@ -175,12 +181,18 @@ class SchemaTest(unittest.TestCase):
             ({"clusters": [{"name": "left", "cpus": "all"}]}, False),
             ({"clusters": [{"name": "left", "workers": 0}]}, False),
             ({"clusters": [{"name": "left"}], "workers": 1}, False),
+            ({"clusters": [{"name": "left"}], "cpus": 1}, False),
         ):
             with self.subTest(platform=platform):
                 document = with_task()
                 document["platform"] = platform
                 document["dags"][0]["cluster"] = "left"
                 self.assertEqual(errors(document) == [], is_valid)
+
+    def test_processors_of_the_platform(self):
+        for cpus, is_valid in ((3, True), ("0-3", True), ([2, "4-5"], True), ([], False), ("all", False)):
+            with self.subTest(cpus=cpus):
+                self.assertEqual(errors({**with_task(), "platform": {"cpus": cpus}}) == [], is_valid)
 
     def test_devices(self):
         for devices, is_valid in (
@@ -230,7 +242,7 @@ class SchemaTest(unittest.TestCase):
             self.assertEqual(robot_errors(yaml.safe_load(text)), [], text)
 
     def test_refuses_bad_robots(self):
-        for level in ("above", "below", {"rate": "5ms"}, {"fifo": 80}, {"nice": -20}):
+        for level in ("above", "below", {"rate": "5ms"}, {"rate": "200Hz"}, {"fifo": 80}, {"nice": -20}):
             document = yaml.safe_load(ROBOT)
             document["threads"][0]["level"] = level
             self.assertEqual(robot_errors(document), [], level)

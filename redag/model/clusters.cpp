@@ -38,6 +38,7 @@ std::vector<ClusterPart> parts_of(const Workload &workload) {
     part.workload.policy = workload.policy;
     part.workload.ties = workload.ties;
     part.first_worker = next_worker;
+    part.cpus = platform.cpus;
     if (platform.clusters.empty()) continue;
     part.name = platform.clusters[c].name;
     part.cpus = platform.clusters[c].cpus;

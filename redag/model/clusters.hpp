@@ -28,7 +28,7 @@ namespace redag {
 struct ClusterPart {
   std::string name;                // of the cluster; empty: the workload has no clusters
   Workload workload;               // its DAGs and workers, without clusters
-  std::vector<int> cpus;           // as Cluster::cpus
+  std::vector<int> cpus;           // of its workers; empty: any
   std::uint32_t first_worker = 0;  // number of its worker 0 in the whole platform
   std::vector<DagId> dags;         // by DagId of `workload`: the DAG in the whole
   std::vector<TaskId> tasks;       // by TaskId of `workload`: the task in the whole

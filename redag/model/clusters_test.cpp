@@ -20,7 +20,7 @@ namespace redag {
 namespace {
 
 constexpr const char *kTwo =
-    "platform: {clusters: [{name: left, workers: 2, cpus: 0-1}, {name: right, cpus: [3, 5-6]}]}\n";
+    "platform: {clusters: [{name: left, workers: 2, cpus: 0-1}, {name: right, workers: 1, cpus: [3, 5-6]}]}\n";
 
 /// DAGs with these keys besides the name and a task. The first one is in line 3.
 std::string dags(const std::vector<std::string> &keys) {
@@ -48,6 +48,18 @@ TEST(Clusters, AreReadWithTheirWorkersAndProcessors) {
   EXPECT_EQ(workload.platform.clusters[1], (Cluster{"right", 1, {3, 5, 6}}));
   EXPECT_EQ(workload.platform.workers, 3U);
   EXPECT_EQ(workload.dags[0].cluster, "right");
+}
+
+TEST(Clusters, HaveAWorkerForEachProcessorByDefault) {
+  const Result<LoadedWorkload> loaded = parse_workload(one_cluster("name: all, cpus: 4-6"), "w.yaml");
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  EXPECT_EQ(loaded->workload.platform.clusters[0], (Cluster{"all", 3, {4, 5, 6}}));
+  EXPECT_EQ(loaded->workload.platform.workers, 3U);
+  const Result<LoadedWorkload> more = parse_workload(one_cluster("name: all, workers: 2, cpus: 4"), "w.yaml");
+  ASSERT_TRUE(more) << to_string(more.error());
+  EXPECT_NE(to_string(more->warnings).find("1:23: warning: cluster 'all' has 2 workers, but 1 processor ("),
+            std::string::npos)
+      << to_string(more->warnings);
 }
 
 TEST(Clusters, ADagNeedsToNameOneOfSeveral) {
@@ -84,7 +96,7 @@ INSTANTIATE_TEST_SUITE_P(
         Refused{"platform: {workers: 2, clusters: [{name: a}]}\n" + dags({""}),
                 "w.yaml:1:21: error: platform has both 'workers' and 'clusters' (each cluster has workers of its own"},
         Refused{"platform: {cpus: 0-3, clusters: [{name: a}]}\n" + dags({""}),
-                "1:12: error: unknown key 'cpus' in platform"},
+                "w.yaml:1:18: error: platform has both 'cpus' and 'clusters' (each cluster has cpus of its own"},
         Refused{"platform: {clusters: []}\n" + dags({""}), "1:22: error: clusters is an empty list"},
         Refused{"platform: {clusters: left}\n" + dags({", cluster: left"}), "1:22: error: clusters must be a list"},
         Refused{"platform: {clusters: [left]}\n" + dags({", cluster: left"}),

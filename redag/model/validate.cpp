@@ -22,11 +22,11 @@ namespace redag {
 namespace {
 
 constexpr std::array<const char *, kFieldCount> kFieldNames = {
-    "name",      "platform",   "workers",     "preemption",  "policy",      "ties",     "dags",
-    "tasks",     "max_active", "max_pending", "criticality", "degrade",     "wcet",     "wcet_low",
-    "bcet",      "period",     "deadline",    "offset",      "jitter",      "region",   "budget",
-    "on_budget", "activation", "overrun",     "priority",    "concurrency", "group",    "after",
-    "execution", "callback",   "clusters",    "cluster",     "cpus",        "segments", "devices"};
+    "name",       "platform",    "workers",     "preemption", "policy",    "ties",      "dags",       "tasks",
+    "max_active", "max_pending", "criticality", "degrade",    "wcet",      "wcet_low",  "bcet",       "period",
+    "deadline",   "offset",      "jitter",      "region",     "budget",    "on_budget", "activation", "overrun",
+    "priority",   "concurrency", "group",       "after",      "execution", "callback",  "clusters",   "cluster",
+    "cpus",       "segments",    "devices",     "rate"};
 
 struct DurationRule {
   Field field;
@@ -69,6 +69,10 @@ class Checker {
       findings_.error(Field::Workers, {},
                       fmt::format("workers must be from 1 to {}, not {}", kMaxWorkers, platform.workers));
     }
+    if (platform.clusters.empty()) {
+      std::unordered_map<int, std::size_t> owners;
+      check_cpus(platform.cpus, platform.workers, 0, owners);
+    }
     const bool dynamic = !is_static(workload_.policy);
     if (platform.preemption == PreemptionMode::Os && dynamic) {
       findings_.error(
@@ -96,6 +100,10 @@ class Checker {
   void check_clusters() {
     const std::vector<Cluster> &clusters = workload_.platform.clusters;
     if (clusters.empty()) return;
+    if (!workload_.platform.cpus.empty()) {
+      findings_.error(Field::Cpus, Field::Clusters, "the platform has both 'cpus' and 'clusters'",
+                      "each cluster has cpus of its own");
+    }
     if (clusters.size() > kMaxClusters) {
       findings_.error(Field::Clusters, {},
                       fmt::format("there are {} clusters; at most {} are allowed", clusters.size(), kMaxClusters));
@@ -119,7 +127,7 @@ class Checker {
                                    cluster.workers));
       }
       workers += cluster.workers;
-      check_cpus(c, owners);
+      check_cpus(cluster.cpus, cluster.workers, c, owners);
     }
     if (workload_.platform.workers == workers && workers <= kMaxWorkers) return;
     findings_.error(Field::Clusters, Field::Workers,
@@ -129,25 +137,41 @@ class Checker {
                                                         workload_.platform.workers, workers));
   }
 
-  void check_cpus(std::size_t c, std::unordered_map<int, std::size_t> &owners) {
-    const Cluster &cluster = workload_.platform.clusters[c];
-    for (const int cpu : cluster.cpus) {
+  // The processors of cluster `c`, or of the platform if there are no clusters.
+  void check_cpus(const std::vector<int> &cpus, std::uint32_t workers, std::size_t c,
+                  std::unordered_map<int, std::size_t> &owners) {
+    const std::vector<Cluster> &clusters = workload_.platform.clusters;
+    const bool is_cluster = c < clusters.size();
+    const std::string owned = is_cluster ? fmt::format("cluster '{}'", clusters[c].name) : "the platform";
+    const auto add = [&](Severity severity, std::string message, std::string hint = {}) {
+      const Field at = is_cluster ? Field::Clusters : Field::Cpus;
+      Finding &finding = severity == Severity::Error
+                             ? findings_.error(at, Field::Cpus, std::move(message), std::move(hint))
+                             : findings_.warning(at, Field::Cpus | Field::Workers, std::move(message), std::move(hint));
+      if (is_cluster) finding.item = static_cast<std::uint32_t>(c);
+    };
+    for (const int cpu : cpus) {
       if (cpu < 0 || cpu > kMaxCpu) {
-        refuse_cluster(
-            c, Field::Cpus,
-            fmt::format("cluster '{}' has processor {}, which is not from 0 to {}", cluster.name, cpu, kMaxCpu));
+        add(Severity::Error, fmt::format("{} has processor {}, which is not from 0 to {}", owned, cpu, kMaxCpu));
         return;
       }
       const auto [owner, is_first] = owners.emplace(cpu, c);
       if (is_first) continue;
-      refuse_cluster(c, Field::Cpus,
-                     fmt::format("processor {} of cluster '{}' is {}", cpu, cluster.name,
-                                 owner->second == c ? "listed twice"
-                                                    : fmt::format("also one of cluster '{}'",
-                                                                  workload_.platform.clusters[owner->second].name)),
-                     "clusters share no processors");
+      if (owner->second == c) {
+        add(Severity::Error, fmt::format("processor {} of {} is listed twice", cpu, owned), "list each one once");
+      } else {
+        add(Severity::Error,
+            fmt::format("processor {} of {} is also one of cluster '{}'", cpu, owned, clusters[owner->second].name),
+            "clusters share no processors");
+      }
       return;
     }
+    if (cpus.empty() || workers <= cpus.size()) return;
+    add(Severity::Warning,
+        fmt::format("{} has {} workers, but {} processor{}", owned, workers, cpus.size(), cpus.size() == 1 ? "" : "s"),
+        fmt::format("list more processors, or write 'workers: {}': bounds and simulations assume a processor for each "
+                    "worker",
+                    cpus.size()));
   }
 
   // Requires a place in the DAG.
@@ -250,6 +274,7 @@ class Checker {
                         fmt::format("the name '{}' is used by another task of DAG '{}'", task.name, dag.name),
                         "choose a unique name for each task of a DAG");
       }
+      check_joined_name(id, task);
       check_durations(task);
       check_wcet_low(dag, task);
       check_execution(task);
@@ -261,6 +286,20 @@ class Checker {
       sound_edges = check_edges(dag, i, findings_) && sound_edges;
     }
     check_graph(dag, id, sound_edges, findings_);
+  }
+
+  // Options, links and results name a task as DAG.TASK. Only a dot within a name can make two of these equal.
+  void check_joined_name(DagId id, const Task &task) {
+    const std::string &dag = workload_.dags[id.value].name;
+    if (dag.find('.') == std::string::npos && task.name.find('.') == std::string::npos) return;
+    const auto [first, is_first] = joined_names_.emplace(dag + '.' + task.name, id);
+    if (is_first || first->second == id) return;  // two equal names in one DAG are another mistake
+    const std::string &other = workload_.dags[first->second.value].name;
+    if (other == dag) return;
+    findings_.error(Field::Name, {},
+                    fmt::format("task '{}' of DAG '{}' and task '{}' of DAG '{}' are both '{}'", task.name, dag,
+                                first->first.substr(other.size() + 1), other, first->first),
+                    "rename one of them: results and options name a task by its DAG, a dot, and its name");
   }
 
   void check_durations(const Task &task) {
@@ -402,7 +441,8 @@ class Checker {
     for (const auto &[field, value] : {std::pair{Field::Offset, task.offset}, std::pair{Field::Jitter, task.jitter}}) {
       if (value == 0) continue;
       findings_.error(field, Field::Activation, fmt::format("data task '{}' has '{}'", task.name, to_string(field)),
-                      "only timer tasks can have it, because predecessors release a data task");
+                      fmt::format("add 'activation: timer', or remove '{}:', because predecessors release a data task",
+                                  to_string(field)));
     }
   }
 
@@ -525,6 +565,7 @@ class Checker {
   ValidateOptions options_;
   FindingList findings_;
   std::unordered_map<std::string_view, DagId> groups_;           // group -> DAG that uses it first
+  std::unordered_map<std::string, DagId> joined_names_;          // DAG.TASK -> the first DAG
   std::unordered_map<std::string, std::string_view> callbacks_;  // text of a callback -> task that names it first
 };
 

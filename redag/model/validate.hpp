@@ -67,9 +67,10 @@ enum class Field : std::uint8_t {
   Cpus,
   Segments,
   Devices,
+  Rate,  // in place of Period; find_mistakes() knows periods only
 };
 
-inline constexpr std::size_t kFieldCount = 35;
+inline constexpr std::size_t kFieldCount = 36;
 
 [[nodiscard]] const char *to_string(Field field);
 
@@ -120,6 +121,8 @@ struct ValidateOptions {
   bool waits = false;
   /// Workers of a file that states none.
   std::uint32_t default_workers = 1;
+  /// A task with `after`, but without `activation`, is a timer task, as in what earlier versions wrote.
+  bool timers_by_default = false;
 };
 
 /// Returns every broken rule, in the order of the workload. Linear in its size. Accepts any workload without a crash.

@@ -157,7 +157,7 @@ enum class PreemptionMode : std::uint8_t { None, Cooperative, Os, Auto };
 struct Cluster {
   std::string name;
   std::uint32_t workers = 1;
-  std::vector<int> cpus = {};  // processors of the workers, ascending; empty: any
+  std::vector<int> cpus = {};  // of its workers, as Platform::cpus
 
   friend bool operator==(const Cluster &, const Cluster &) = default;
 };
@@ -183,6 +183,7 @@ struct Platform {
   std::vector<Device> devices = {};
   /// Not one scheduler but several start the jobs, each without knowing those of the others: the processes of a robot.
   bool several_executors = false;
+  std::vector<int> cpus = {};  // processors of the workers, ascending; empty: any, or those of the clusters
 
   friend bool operator==(const Platform &, const Platform &) = default;
 };

@@ -16,6 +16,7 @@
 
 #include <fmt/format.h>
 
+#include "redag/model/hyperperiod_warning.hpp"
 #include "redag/model/text_file.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/model/workload_yaml_node.hpp"
@@ -28,16 +29,17 @@ namespace {
 using yaml::Node;
 
 constexpr std::array kTopFields = {Field::Name, Field::Platform, Field::Policy, Field::Ties, Field::Dags};
-constexpr std::array kPlatformFields = {Field::Workers, Field::Preemption, Field::Clusters, Field::Devices};
+constexpr std::array kPlatformFields = {Field::Workers, Field::Cpus, Field::Preemption, Field::Clusters,
+                                        Field::Devices};
 constexpr std::array kClusterFields = {Field::Name, Field::Workers, Field::Cpus};
-constexpr std::array kDagFields = {Field::Name,        Field::Cluster,   Field::Period,
-                                   Field::Deadline,    Field::MaxActive, Field::MaxPending,
-                                   Field::Criticality, Field::Degrade,   Field::Tasks};
+constexpr std::array kDagFields = {Field::Name,     Field::Cluster,   Field::Period,     Field::Rate,
+                                   Field::Deadline, Field::MaxActive, Field::MaxPending, Field::Criticality,
+                                   Field::Degrade,  Field::Tasks};
 constexpr std::array kTaskFields = {
-    Field::Name,       Field::Wcet,    Field::Bcet,    Field::Period,      Field::Deadline,  Field::Offset,
-    Field::Jitter,     Field::Region,  Field::Budget,  Field::Concurrency, Field::Group,     Field::Criticality,
-    Field::Activation, Field::After,   Field::Overrun, Field::Priority,    Field::Execution, Field::Callback,
-    Field::OnBudget,   Field::WcetLow, Field::Segments};
+    Field::Name,       Field::Wcet,    Field::Bcet,     Field::Period,      Field::Deadline,  Field::Offset,
+    Field::Jitter,     Field::Region,  Field::Budget,   Field::Concurrency, Field::Group,     Field::Criticality,
+    Field::Activation, Field::After,   Field::Overrun,  Field::Priority,    Field::Execution, Field::Callback,
+    Field::OnBudget,   Field::WcetLow, Field::Segments, Field::Rate};
 
 constexpr std::array kCriticalities = {Criticality::Low, Criticality::Normal, Criticality::High};
 constexpr std::array kOnBudgets = {OnBudget::Abort, OnBudget::Log, OnBudget::Demote, OnBudget::SkipNext};
@@ -84,11 +86,15 @@ class Reader : private yaml::ValueReader {
     read_top();
     if (structure_known_) {
       inherit();
-      report(find_mistakes(workload_, options_));
+      std::vector<Finding> findings = find_mistakes(workload_, options_);
+      const auto states_rate = [this](const TaskRef &ref) { return is_rate(ref.dag, ref.index); };
+      if (auto warning = hyperperiod_warning(workload_, states_rate)) findings.push_back(*std::move(warning));
+      report(std::move(findings));
     }
     Diagnostics found = take_diagnostics();
     if (has_errors(found)) return tl::unexpected<Diagnostics>(std::move(found));
-    const bool states_workers = platform_.node != nullptr && find(platform_, Field::Workers) != nullptr;
+    const bool states_workers = platform_.node != nullptr &&
+                                (find(platform_, Field::Workers) != nullptr || find(platform_, Field::Cpus) != nullptr);
     return LoadedWorkload{std::move(workload_), std::move(found), states_workers};
   }
 
@@ -163,10 +169,10 @@ class Reader : private yaml::ValueReader {
     platform_.node = find(root_, Field::Platform);
     if (platform_.node == nullptr) return;
     if (!check_map(*platform_.node, "platform", names_of(kPlatformFields))) {
-      root_.broken |= FieldSet(Field::Workers) | Field::Preemption | Field::Clusters | Field::Devices;
+      root_.broken |= FieldSet(Field::Workers) | Field::Preemption | Field::Clusters | Field::Devices | Field::Cpus;
       return;
     }
-    take_count(platform_, Field::Workers, workload_.platform.workers, kMaxWorkers);
+    take_workers(platform_, workload_.platform.workers, workload_.platform.cpus);
     read_clusters();
     take_enum(platform_, Field::Preemption, workload_.platform.preemption, kPreemptionModes);
     take(platform_, Field::Devices, workload_.platform.devices,
@@ -174,13 +180,25 @@ class Reader : private yaml::ValueReader {
     root_.broken |= platform_.broken;
   }
 
+  /// Reads the number of workers and their processors. Processors alone mean one worker for each.
+  void take_workers(Part &part, std::uint32_t &workers, std::vector<int> &cpus) {
+    take(part, Field::Cpus, cpus,
+         [this](const Node &value, std::string_view key) { return ValueReader::cpus(value, key); });
+    if (!cpus.empty()) workers = static_cast<std::uint32_t>(cpus.size());
+    if (part.broken.intersects(Field::Cpus)) part.broken |= Field::Workers;
+    take_count(part, Field::Workers, workers, kMaxWorkers);
+  }
+
   void read_clusters() {
     const std::vector<Node> *nodes = take_list(platform_, Field::Clusters);
     if (nodes == nullptr) return;
-    if (const Node *workers = find(platform_, Field::Workers)) {
-      error(*workers, "platform has both 'workers' and 'clusters'",
-            "each cluster has workers of its own: remove 'workers:' from the platform");
-      platform_.broken |= Field::Workers;
+    for (const Field field : {Field::Workers, Field::Cpus}) {
+      const Node *given = find(platform_, field);
+      if (given == nullptr) continue;
+      error(*given, fmt::format("platform has both '{}' and 'clusters'", to_string(field)),
+            fmt::format("each cluster has {} of its own: remove '{}:' from the platform", to_string(field),
+                        to_string(field)));
+      platform_.broken |= field;
     }
     if (nodes->empty()) error(*find(platform_, Field::Clusters), "clusters is an empty list", "remove 'clusters:'");
     std::vector<Cluster> &clusters = workload_.platform.clusters;
@@ -193,9 +211,7 @@ class Reader : private yaml::ValueReader {
         continue;
       }
       take_text(part, Field::Name, cluster.name);
-      take_count(part, Field::Workers, cluster.workers, kMaxWorkers);
-      take(part, Field::Cpus, cluster.cpus,
-           [this](const Node &value, std::string_view key) { return cpus(value, key); });
+      take_workers(part, cluster.workers, cluster.cpus);
       workers += cluster.workers;
       if (part.broken.intersects(FieldSet(Field::Name) | Field::Workers | Field::Cpus)) {
         platform_.broken |= Field::Clusters;
@@ -206,15 +222,15 @@ class Reader : private yaml::ValueReader {
 
   void read_dag(const Node &node, Dag &dag, DagPart &part) {
     part.node = &node;
-    static const std::vector<std::string_view> kNames = names_of(kDagFields);
-    if (!check_map(node, "a DAG", kNames)) {
+    static const std::vector<std::string_view> kKeys = names_of(kDagFields);
+    if (!check_map(node, "a DAG", kKeys)) {
       for (const Field field : kDagFields) part.broken |= field;
       return;
     }
     take_text(part, Field::Name, dag.name);
     take_text(part, Field::Cluster, dag.cluster);
     Duration period = 0;
-    take_positive_duration(part, Field::Period, period);
+    take_own_period(part, period, fmt::format("DAG '{}'", dag.name));
     take_positive_duration(part, Field::Deadline, dag.deadline);
     take_count(part, Field::MaxActive, dag.max_active, kMaxBound);
     take_count(part, Field::MaxPending, dag.max_pending, kMaxBound);
@@ -234,8 +250,8 @@ class Reader : private yaml::ValueReader {
 
   void read_task(const Node &node, Task &task, TaskPart &part) {
     part.node = &node;
-    static const std::vector<std::string_view> kNames = names_of(kTaskFields);
-    if (!check_map(node, "a task", kNames)) {
+    static const std::vector<std::string_view> kKeys = names_of(kTaskFields);
+    if (!check_map(node, "a task", kKeys)) {
       for (const Field field : kTaskFields) part.broken |= field;
       return;
     }
@@ -308,16 +324,65 @@ class Reader : private yaml::ValueReader {
     task.waits = std::move(read->waits);
   }
 
+  /// Returns what states the period of this DAG or task itself: `period` or `rate`; null if nothing does.
+  static const Node *own_period(const Part &part) {
+    if (part.node->kind != Node::Kind::Map) return nullptr;
+    const Node *period = find(part, Field::Period);
+    return period != nullptr ? period : find(part, Field::Rate);
+  }
+
+  /// True if the period of a task follows from a rate, which the task or its DAG states.
+  [[nodiscard]] bool is_rate(DagId dag, std::uint32_t task) const {
+    const Node *own = own_period(dags_[dag.value].tasks[task]);
+    const Part &holder = own != nullptr ? static_cast<const Part &>(dags_[dag.value].tasks[task]) : dags_[dag.value];
+    return holder.node->kind == Node::Kind::Map && find(holder, Field::Rate) != nullptr;
+  }
+
+  void take_own_period(Part &part, Duration &out, const std::string &whose) {
+    const Node *rate = find(part, Field::Rate);
+    const Node *period = find(part, Field::Period);
+    if (rate != nullptr && period != nullptr) {
+      error(*rate, fmt::format("{} has both 'period' and 'rate'", whose), "remove one of them");
+      part.broken |= Field::Period;
+    } else if (rate != nullptr) {
+      take(part, Field::Rate, out,
+           [this](const Node &node, std::string_view key) { return ValueReader::rate(node, key); });
+      if (part.broken.intersects(Field::Rate)) part.broken |= Field::Period;
+    } else {
+      const std::size_t mistakes = diagnostics_.size();
+      take_positive_duration(part, Field::Period, out);
+      if (diagnostics_.size() == mistakes) return;
+      if (const Result<Duration> meant = parse_rate(period->text)) {
+        diagnostics_.back().hint =
+            fmt::format("write 'rate: {}', or 'period: {}'", period->text, format_duration(*meant));
+      }
+    }
+  }
+
+  /// True if predecessors release the task's jobs, because it has some and states nothing that only timers have.
+  bool is_data_by_default(const Task &task, const TaskPart &part) const {
+    if (options_.timers_by_default || part.node->kind != Node::Kind::Map) return false;
+    const Node *after = find(part, Field::After);
+    const bool has_predecessor = after != nullptr && after->kind != Node::Kind::Null &&
+                                 (after->kind != Node::Kind::Sequence || !after->children.empty());
+    const bool may_have_timer =
+        part.broken.intersects(Field::Callback) || (task.callback && task.callback->kind == Callback::Kind::Timer);
+    return has_predecessor && find(part, Field::Activation) == nullptr && own_period(part) == nullptr &&
+           !may_have_timer;
+  }
+
   void take_period(Task &task, TaskPart &part, Duration inherited, FieldSet dag_broken) {
-    const Node *given = part.node->kind == Node::Kind::Map ? find(part, Field::Period) : nullptr;
+    if (is_data_by_default(task, part)) task.activation = Activation::Data;
+    const Node *given = own_period(part);
     if (part.broken.intersects(Field::Activation)) part.broken |= Field::Period;
     if (task.activation == Activation::Data) {
       if (given == nullptr) return;
-      error(*given, fmt::format("data task '{}' has a period", task.name),
-            "a data task inherits its period: remove 'period:', or use 'activation: timer'");
+      const char *key = given == find(part, Field::Period) ? "period" : "rate";
+      error(*given, fmt::format("data task '{}' has a {}", task.name, key),
+            fmt::format("a data task inherits its period: remove '{}:', or use 'activation: timer'", key));
       part.broken |= Field::Period;
     } else if (given != nullptr) {
-      take_positive_duration(part, Field::Period, task.period);
+      take_own_period(part, task.period, fmt::format("task '{}'", task.name));
     } else if (part.broken.intersects(Field::Callback)) {
       part.broken |= Field::Period;  // its timer may have one
     } else if (task.callback && task.callback->period != 0) {
@@ -407,8 +472,11 @@ class Reader : private yaml::ValueReader {
         part.edges.push_back(&item);
         return;
       }
+      const std::string prefix = dag.name + ".";
+      const bool has_dag = name->starts_with(prefix) && positions.count(name->substr(prefix.size())) != 0;
       error(item, fmt::format("there is no task {} in DAG '{}'", yaml::describe(item), dag.name),
-            did_you_mean(*name, names, "'after' can only name tasks of the same DAG"));
+            has_dag ? fmt::format("write '{}', without the name of the DAG", name->substr(prefix.size()))
+                    : did_you_mean(*name, names, "'after' can only name tasks of the same DAG"));
     }
     part.broken |= Field::After;
   }
@@ -484,9 +552,15 @@ class Reader : private yaml::ValueReader {
 
   const Node &place(const Finding &finding, const Part &part) const {
     const bool of_platform = finding.field == Field::Workers || finding.field == Field::Preemption ||
-                             finding.field == Field::Clusters || finding.field == Field::Devices;
+                             finding.field == Field::Clusters || finding.field == Field::Devices ||
+                             finding.field == Field::Cpus;
     const Part &holder = of_platform && platform_.node != nullptr ? platform_ : part;
-    const Node *value = holder.node->kind == Node::Kind::Map ? find(holder, finding.field) : nullptr;
+    const Node *value = nullptr;
+    if (finding.field == Field::Period) {
+      value = own_period(holder);
+    } else if (holder.node->kind == Node::Kind::Map) {
+      value = find(holder, finding.field);
+    }
     if (value == nullptr) return *part.node;
     if (finding.item == Finding::kNone) return *value;
     if (finding.field == Field::Clusters) return value->children[finding.item];

@@ -18,7 +18,7 @@ namespace redag {
 struct LoadedWorkload {
   Workload workload;
   Diagnostics warnings;
-  bool states_workers = false;  // if not, `workload` has the format's default
+  bool states_workers = false;  // by `workers` or `cpus`; if not, `workload` has the format's default
 };
 
 /// What a file must state. LoadOptions{.wcet_optional = true} is for programs that run callbacks and measure them.

@@ -62,7 +62,15 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"name: \"x\\\"\ndags: 3\n", {"w.yaml:1:7: error: invalid YAML: a quote is not closed"}},
         Mistake{"name: a: b\n", {"w.yaml:1:8: error: invalid YAML: mapping values are not allowed in this context"}},
         Mistake{"dags:\n\t- name: d\n",
-                {"w.yaml:2:1: error: invalid YAML: found character that cannot start any token"}},
+                {"w.yaml:2:1: error: a tab is in the indentation, where YAML takes only spaces (write '  - name: d')"}},
+        Mistake{
+            "dags:\n  - name: d\n  \ttasks: [x]\n",
+            {"w.yaml:3:3: error: a tab is in the indentation, where YAML takes only spaces (write '    tasks: [x]')"}},
+        Mistake{"na\xC3\xAFve:\xC2\xA0x\ndags: []\n",
+                {"w.yaml:1:7: error: U+00A0 is here, which looks like a space or like nothing, and is part of the text "
+                 "(write 'na\xC3\xAFve: x')"}},
+        Mistake{"name: x\n\xC2\xA0 policy: edf\n", {"w.yaml:2:1: error: U+00A0 is here"}},
+        Mistake{"name: x\nticks\xE2\x80\x8B: 5\n", {"w.yaml:2:6: error: U+200B is here"}},
         Mistake{"name: x\n--- \nname: y\n", {"w.yaml:3:1: error: the file has a second document"}},
         Mistake{"name: &a x\ndags: *a\n", {"w.yaml:1:7: error: aliases and anchors"}},
         Mistake{"dags: *a\n", {"w.yaml:1:7: error: aliases and anchors"}},
@@ -124,8 +132,9 @@ INSTANTIATE_TEST_SUITE_P(
                 {"w.yaml:4:40: error: key 'wcet' is given twice"}},
         Mistake{"platform: {worker: 2}\n" + tasks({"{name: t, wcet: 1ms, period: 1s}"}),
                 {"w.yaml:1:12: error: unknown key 'worker' in platform (did you mean 'workers'?)"}},
-        Mistake{"platform: 4\n" + tasks({"{name: t, wcet: 1ms, period: 1s}"}),
-                {"w.yaml:1:11: error: platform must be a map of workers, preemption, clusters, devices, not '4'"}},
+        Mistake{
+            "platform: 4\n" + tasks({"{name: t, wcet: 1ms, period: 1s}"}),
+            {"w.yaml:1:11: error: platform must be a map of workers, cpus, preemption, clusters, devices, not '4'"}},
         Mistake{"dags:\n- {name: d, tasks: [{name: t, wcet: 1ms, period: 1s}]}\n"
                 "- {name: d, tasks: [{name: t, wcet: 1ms, period: 1s}]}\n",
                 {"w.yaml:3:10: error: the name 'd' is used by another DAG"}},
@@ -178,7 +187,23 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{with("wcet: 1ms, period: 1s, overrun: {}"), {"4:49: error: overrun 'queue' needs a depth"}},
         Mistake{with("wcet: 1ms, period: 1s, priority: high"),
                 {"4:50: error: priority must be a whole number from -2147483648"}},
-        Mistake{with("wcet: 1ms, period: 1s, priority: \"3\""), {"4:50: error: priority must be a whole number"}},
+        Mistake{
+            with("wcet: 1ms, period: 1s, priority: \"3\""),
+            {"4:50: error: priority must be a whole number from -2147483648 to 2147483647, not '3' in quotes, which "
+             "make it a text (write 'priority: 3')"}},
+        Mistake{with("wcet: 1ms, period: 100Hz"),
+                {"4:36: error: period: '100Hz' is not a duration: it is a rate (write 'rate: 100Hz', or 'period: "
+                 "10ms')"}},
+        Mistake{with("wcet: 1ms, rate: 10ms"),
+                {"4:34: error: rate: '10ms' is not a rate: it is a duration (write 'period: 10ms')"}},
+        Mistake{with("wcet: 1ms, rate: 30"),
+                {"4:34: error: rate: '30' is not a rate: it has no unit (Hz, kHz) (write a number and a unit, as in "
+                 "30Hz)"}},
+        Mistake{with("wcet: 1ms, rate: [1Hz]"), {"4:34: error: rate must be a rate such as 30Hz, not a list"}},
+        Mistake{with("wcet: 1ms, period: 1s, rate: 1Hz"),
+                {"4:46: error: task 't' has both 'period' and 'rate' (remove one of them)"}},
+        Mistake{"dags: [{name: d, period: 1s, rate: 1Hz, tasks: [{name: t, wcet: 1ms}]}]\n",
+                {"1:36: error: DAG 'd' has both 'period' and 'rate'"}},
         Mistake{with("wcet: 1ms, period: 1s, priority: 99999999999"), {"4:50: error: priority must be a whole number"}},
         Mistake{with("wcet: 1ms, period: 1s, execution: normal"),
                 {"4:51: error: execution must be one of constant, uniform, {normal: {mean, stddev}}"}},
@@ -195,6 +220,16 @@ INSTANTIATE_TEST_SUITE_P(
                 {"4:63: error: empirical must be a list of durations, not '1ms'"}},
         Mistake{"platform: {workers: 0}\n" + with("wcet: 1ms, period: 1s"),
                 {"w.yaml:1:21: error: workers must be a whole number from 1"}},
+        Mistake{
+            "platform: {workers: \"2\"}\n" + with("wcet: 1ms, period: 1s"),
+            {"w.yaml:1:21: error: workers must be a whole number from 1 to 4096, not '2' in quotes, which make it a "
+             "text (write 'workers: 2')"}},
+        Mistake{"platform: {workers: \"two\"}\n" + with("wcet: 1ms, period: 1s"),
+                {"w.yaml:1:21: error: workers must be a whole number from 1 to 4096, not 'two'"}},
+        Mistake{"platform: {cpus: 3-1}\n" + with("wcet: 1ms, period: 1s"),
+                {"w.yaml:1:18: error: cpus must be a list of processors such as 0-3 or [0, 2-5], not '3-1'"}},
+        Mistake{"platform: {cpus: 0, clusters: [{name: c}]}\n" + with("wcet: 1ms, period: 1s"),
+                {"w.yaml:1:18: error: platform has both 'cpus' and 'clusters' (each cluster has cpus of its own"}},
         Mistake{"platform: {workers: 5000}\n" + with("wcet: 1ms, period: 1s"),
                 {"w.yaml:1:21: error: workers must be a whole number from 1 to 4096, not '5000'"}},
         Mistake{"platform: {workers: -1}\n" + with("wcet: 1ms, period: 1s"),
@@ -275,6 +310,18 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{
             tasks({"{name: lidar, wcet: 1ms, period: 1s}", "{name: b, wcet: 1ms, activation: data, after: [lidra]}"}),
             {"w.yaml:5:54: error: there is no task 'lidra' in DAG 'd' (did you mean 'lidar'?)"}},
+        Mistake{tasks({"{name: lidar, wcet: 1ms, period: 1s}", "{name: b, wcet: 1ms, after: d.lidar}"}),
+                {"w.yaml:5:35: error: there is no task 'd.lidar' in DAG 'd' (write 'lidar', without the name of the "
+                 "DAG)"}},
+        Mistake{"dags:\n- {name: a, tasks: [{name: b.c, wcet: 1ms, period: 1s}]}\n"
+                "- {name: a.b, tasks: [{name: c, wcet: 1ms, period: 1s}]}\n",
+                {"w.yaml:3:30: error: task 'c' of DAG 'a.b' and task 'b.c' of DAG 'a' are both 'a.b.c' (rename one of "
+                 "them"}},
+        Mistake{tasks({"{name: a, wcet: 1ms, period: 1s}", "{name: b, wcet: 1ms, after: a, offset: 1ms}"}),
+                {"w.yaml:5:46: error: data task 'b' has 'offset' (add 'activation: timer', or remove 'offset:'"}},
+        Mistake{
+            tasks({"{name: a, wcet: 1ms, period: 1s}", "{name: b, wcet: 1ms, activation: data, after: a, rate: 1Hz}"}),
+            {"w.yaml:5:62: error: data task 'b' has a rate (a data task inherits its period: remove 'rate:'"}},
         Mistake{tasks({"{name: a, wcet: 1ms, activation: data}"}),
                 {"w.yaml:4:40: error: data task 'a' has no predecessor"}},
         Mistake{tasks({"{name: a, wcet: 1ms, period: 1s, after: [a]}"}),

@@ -13,6 +13,7 @@
 #include <unistd.h>
 #include <nlohmann/json.hpp>
 
+#include "redag/model/clusters.hpp"
 #include "redag/model/validate.hpp"
 #include "redag_lab/workload/generate.hpp"
 #include "redag_testing/repository.hpp"
@@ -135,6 +136,63 @@ dags:
   EXPECT_EQ(second.overrun, Overrun::Queue);
   EXPECT_EQ(second.queue_depth, 3U);
   EXPECT_EQ(second.execution.samples, (std::vector<Duration>{kMillisecond, 500 * kMicrosecond}));
+}
+
+TEST(ParseWorkload, ReadsRates) {
+  const Workload workload = read(R"(
+dags:
+  - {name: camera, rate: 30Hz, tasks: [{name: a, wcet: 1us}, {name: b, wcet: 1us, rate: 1.5kHz}]}
+)");
+  EXPECT_EQ(workload.dags.at(0).tasks.at(0).period, 33'333'333);
+  EXPECT_EQ(workload.dags.at(0).tasks.at(1).period, 666'667);
+}
+
+TEST(ParseWorkload, ATaskWithPredecessorsAndWithoutAPeriodOfItsOwnIsADataTask) {
+  constexpr std::string_view kTasks = R"(
+dags:
+  - name: d
+    period: 10ms
+    tasks:
+      - {name: x, wcet: 1ms}
+      - {name: plain, wcet: 1ms, after: x}
+      - {name: chosen, wcet: 1ms, after: [x], activation: timer}
+      - {name: slow, wcet: 1ms, after: x, period: 20ms}
+      - {name: rated, wcet: 1ms, after: x, rate: 50Hz}
+      - {name: ros, wcet: 1ms, after: x, callback: {node: /n, timer: any}}
+      - {name: subscribed, wcet: 1ms, after: x, callback: {node: /n, subscription: /t}}
+      - {name: alone, wcet: 1ms, after: []}
+)";
+  const auto activations = [&](LoadOptions options) {
+    const Result<LoadedWorkload> loaded = parse_workload(kTasks, "w.yaml", options);
+    std::string text;
+    if (!loaded) return to_string(loaded.error());
+    for (const Task &task : loaded->workload.dags[0].tasks) {
+      if (task.activation == Activation::Data) text += task.name + " ";
+    }
+    return text;
+  };
+  EXPECT_EQ(activations({}), "plain subscribed ");
+  EXPECT_EQ(activations({.timers_by_default = true}), "") << "what earlier versions wrote keeps its meaning";
+}
+
+TEST(ParseWorkload, ReadsTheProcessorsOfThePlatform) {
+  const auto platform = [](std::string_view keys) {
+    return read(fmt::format("platform: {{{}}}\ndags: [{{name: d, tasks: [{{name: t, wcet: 1ms, period: 1s}}]}}]", keys))
+        .platform;
+  };
+  EXPECT_EQ(platform("cpus: [2, 3]").cpus, (std::vector<int>{2, 3}));
+  EXPECT_EQ(platform("cpus: [2, 3]").workers, 2U);
+  EXPECT_EQ(platform("cpus: 4-7, workers: 3").workers, 3U);
+  EXPECT_EQ(
+      parts_of(read("platform: {cpus: 5}\ndags: [{name: d, tasks: [{name: t, wcet: 1ms, period: 1s}]}]")).at(0).cpus,
+      std::vector<int>{5});
+  const auto loaded = parse_workload(
+      "platform: {workers: 3, cpus: 0-1}\ndags: [{name: d, tasks: [{name: t, wcet: 1ms, period: 1s}]}]\n", "w.yaml");
+  ASSERT_TRUE(loaded);
+  EXPECT_TRUE(loaded->states_workers);
+  EXPECT_EQ(to_string(loaded->warnings),
+            "w.yaml:1:30: warning: the platform has 3 workers, but 2 processors (list more processors, or write "
+            "'workers: 2': bounds and simulations assume a processor for each worker)");
 }
 
 TEST(ParseWorkload, BcetMeansUniformUnlessSaidOtherwise) {

@@ -33,6 +33,14 @@ void ValueReader::wrong_type(const Node &at, std::string_view key, std::string_v
   error(at, fmt::format("{} must be {}, not {}", key, expected, describe(at)));
 }
 
+void ValueReader::wrong_number(const Node &at, std::string_view key, std::string_view expected) {
+  wrong_type(at, key, expected);
+  const bool is_number = !at.text.empty() && at.text.find_first_not_of("0123456789.-") == std::string::npos;
+  if (at.kind != Node::Kind::Scalar || !at.quoted || !is_number) return;
+  diagnostics_.back().message += " in quotes, which make it a text";
+  diagnostics_.back().hint = fmt::format("write '{}: {}'", key, at.text);
+}
+
 std::string ValueReader::did_you_mean(std::string_view name, const std::vector<std::string_view> &candidates,
                                       std::string_view else_say) {
   if (candidates.size() > comparisons_left_) return std::string(else_say);
@@ -95,6 +103,21 @@ std::optional<Duration> ValueReader::duration(const Node &node, std::string_view
   return std::nullopt;
 }
 
+std::optional<Duration> ValueReader::rate(const Node &node, std::string_view key) {
+  if (node.kind != Node::Kind::Scalar) {
+    wrong_type(node, key, "a rate such as 30Hz");
+    return std::nullopt;
+  }
+  Result<Duration> period = parse_rate(node.text);
+  if (period) return *period;
+  const bool is_duration = parse_duration(node.text).has_value();
+  for (const Diagnostic &why : period.error()) {
+    error(node, fmt::format("{}: {}", key, why.message),
+          is_duration ? fmt::format("write 'period: {}'", node.text) : why.hint);
+  }
+  return std::nullopt;
+}
+
 std::optional<Duration> ValueReader::positive_duration(const Node &node, std::string_view key) {
   std::optional<Duration> value = duration(node, key);
   if (value && *value <= 0) {
@@ -132,7 +155,7 @@ std::optional<double> ValueReader::real(const Node &node, std::string_view key) 
     const auto [used, code] = std::from_chars(node.text.data(), end, value);
     if (code == std::errc() && used == end && std::isfinite(value)) return value;
   }
-  wrong_type(node, key, "a number such as 2.5");
+  wrong_number(node, key, "a number such as 2.5");
   return std::nullopt;
 }
 

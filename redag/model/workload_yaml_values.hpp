@@ -34,6 +34,8 @@ class ValueReader {
  protected:
   void error(const Node &at, std::string message, std::string hint = {});
   void wrong_type(const Node &at, std::string_view key, std::string_view expected);
+  /// The same for a number, which a quoted text may have been meant to be.
+  void wrong_number(const Node &at, std::string_view key, std::string_view expected);
 
   /// Returns "did you mean 'x'?", or `else_say` if no candidate is near.
   std::string did_you_mean(std::string_view name, const std::vector<std::string_view> &candidates,
@@ -48,6 +50,8 @@ class ValueReader {
 
   std::optional<Duration> duration(const Node &node, std::string_view key);
   std::optional<Duration> positive_duration(const Node &node, std::string_view key);
+  /// Reads a rate as its period.
+  std::optional<Duration> rate(const Node &node, std::string_view key);
   std::optional<Duration> duration_from_zero(const Node &node, std::string_view key);
   /// Reads a name; see name_mistake().
   std::optional<std::string> text(const Node &node, std::string_view key);
@@ -74,7 +78,7 @@ class ValueReader {
       const auto [used, code] = std::from_chars(node.text.data(), end, value);
       if (code == std::errc() && used == end && value >= smallest && value <= largest) return value;
     }
-    wrong_type(node, key, "a whole number from " + std::to_string(smallest) + " to " + std::to_string(largest));
+    wrong_number(node, key, "a whole number from " + std::to_string(smallest) + " to " + std::to_string(largest));
     return std::nullopt;
   }
 

@@ -5,11 +5,13 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <optional>
 
 #include <fmt/format.h>
 
 #include "redag/base/check.hpp"
 #include "redag/base/cpu_list.hpp"
+#include "redag/model/hyperperiod_warning.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/model/workload_yaml.hpp"
 #include "redag/model/yaml_writer.hpp"
@@ -27,6 +29,15 @@ void write(Writer &out, Field field, std::uint32_t value) { out.write(to_string(
 
 void write_duration(Writer &out, Field field, Duration value) {
   if (value != 0) write(out, field, format_duration(value));
+}
+
+/// Writes a period, or the rate that it was rounded from.
+void write_period(Writer &out, Duration period) {
+  if (const std::optional<Duration> rate = rounded_rate(period)) {
+    write(out, Field::Rate, fmt::format("{}Hz", *rate));
+  } else {
+    write_duration(out, Field::Period, period);
+  }
 }
 
 /// Returns the period that all timer tasks share, to be stated once for the DAG; 0: they share none.
@@ -70,13 +81,14 @@ void write_execution(Writer &out, const Task &task) {
 
 void write_edges(Writer &out, const Dag &dag, const Task &task) {
   if (task.predecessors.empty()) return;
+  const bool is_list = task.predecessors.size() > 1;
   out.text(to_string(Field::After));
-  out.begin_list();
+  if (is_list) out.begin_list();
   for (const std::uint32_t p : task.predecessors) {
     REDAG_CHECK(p < dag.tasks.size(), "to_yaml() needs a valid workload");
     out.text(dag.tasks[p].name);
   }
-  out.end_list();
+  if (is_list) out.end_list();
 }
 
 void write_overrun(Writer &out, const Task &task) {
@@ -156,11 +168,14 @@ void write_task(Writer &out, const Platform &platform, const Dag &dag, const Tas
   write_duration(out, Field::WcetLow, task.wcet_low);
   write_duration(out, Field::Bcet, task.bcet);
   write_execution(out, task);
-  if (task.activation == Activation::Data) {
+  const bool is_data = task.activation == Activation::Data;
+  const bool has_period = !is_data && task.period != implied_period;
+  const bool is_timer_callback = task.callback && task.callback->kind == Callback::Kind::Timer;
+  // Predecessors alone would mean a data task, which is stated too, for readers of earlier versions.
+  if (is_data || (!task.predecessors.empty() && !has_period && !is_timer_callback)) {
     write(out, Field::Activation, to_string(task.activation));
-  } else if (task.period != implied_period) {
-    write_duration(out, Field::Period, task.period);
   }
+  if (has_period) write_period(out, task.period);
   if (task.deadline != task.period) write_duration(out, Field::Deadline, task.deadline);
   write_duration(out, Field::Offset, task.offset);
   write_duration(out, Field::Jitter, task.jitter);
@@ -177,20 +192,24 @@ void write_task(Writer &out, const Platform &platform, const Dag &dag, const Tas
   out.end_map();
 }
 
+void write_workers(Writer &out, std::uint32_t workers, const std::vector<int> &cpus) {
+  write(out, Field::Workers, workers);
+  if (!cpus.empty()) write(out, Field::Cpus, format_cpu_list(cpus));
+}
+
 void write_platform(Writer &out, const Platform &platform) {
   out.text(to_string(Field::Platform));
   const bool is_short = platform.clusters.empty() && platform.devices.empty();
   out.begin_map(is_short ? Layout::OneLine : Layout::Lines);
   if (platform.clusters.empty()) {
-    write(out, Field::Workers, platform.workers);
+    write_workers(out, platform.workers, platform.cpus);
   } else {
     out.text(to_string(Field::Clusters));
     out.begin_list();
     for (const Cluster &cluster : platform.clusters) {
       out.begin_map(Layout::OneLine);
       write(out, Field::Name, cluster.name);
-      write(out, Field::Workers, cluster.workers);
-      if (!cluster.cpus.empty()) write(out, Field::Cpus, format_cpu_list(cluster.cpus));
+      write_workers(out, cluster.workers, cluster.cpus);
       out.end_map();
     }
     out.end_list();
@@ -216,7 +235,7 @@ void write_dag(Writer &out, const Platform &platform, const Dag &dag) {
   out.begin_map();
   write(out, Field::Name, dag.name);
   if (!dag.cluster.empty()) write(out, Field::Cluster, dag.cluster);
-  write_duration(out, Field::Period, period);
+  write_period(out, period);
   write_duration(out, Field::Deadline, dag.deadline);
   if (dag.max_active != 0) write(out, Field::MaxActive, dag.max_active);
   if (dag.max_pending != 0) write(out, Field::MaxPending, dag.max_pending);

@@ -103,6 +103,36 @@ Workload arbitrary_workload() {
   return workload;
 }
 
+TEST(ToYaml, WritesAsPeopleDo) {
+  const std::string text =
+      "name: w\n"
+      "platform: {workers: 2, cpus: \"2,5\", preemption: auto}\n"
+      "policy: rate_monotonic\n"
+      "dags:\n"
+      "  - name: d\n"
+      "    rate: 30Hz\n"
+      "    tasks:\n"
+      "      - {name: a, wcet: 200us}\n"
+      "      - {name: b, wcet: 1.5ms, activation: data, after: a}\n"
+      "      - {name: c, wcet: 1ms, activation: timer, after: [a, b]}\n";
+  const Result<LoadedWorkload> loaded = parse_workload(text, "w.yaml");
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  EXPECT_EQ(to_yaml(loaded->workload), text);
+}
+
+TEST(ToYaml, WritesPeriodsThatAreNoWholeRateAsTheyAre) {
+  const auto written = [](const char *period) {
+    const std::string text = std::string("dags: [{name: d, tasks: [{name: t, wcet: 1us, ") + period + "}]}]";
+    const std::string out = to_yaml(parse_workload(text, "w.yaml")->workload);
+    const std::size_t at = out.find("    ", out.find("name: d"));
+    return out.substr(at + 4, out.find('\n', at) - at - 4);
+  };
+  EXPECT_EQ(written("period: 33.333333ms"), "rate: 30Hz");
+  EXPECT_EQ(written("period: 33.333334ms"), "period: 33.333334ms");
+  EXPECT_EQ(written("rate: 400Hz"), "period: 2.5ms");
+  EXPECT_EQ(written("rate: 3kHz"), "period: 333.333us");
+}
+
 RC_GTEST_PROP(ToYaml, RoundTrips, ()) {
   const Workload workload = arbitrary_workload();
   const std::string text = to_yaml(workload);

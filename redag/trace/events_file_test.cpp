@@ -10,6 +10,7 @@
 #include <filesystem>
 
 #include "redag/base/rng.hpp"
+#include "redag/model/workload_yaml.hpp"
 #include "redag/trace/output_file.hpp"
 #include "redag/trace/run_info_json.hpp"
 #include "redag_testing/builders.hpp"
@@ -240,6 +241,23 @@ TEST_F(EventsFile, WithoutAnOrderOfTiesItWasFixed) {
   ASSERT_NE(key, std::string::npos);
   text.erase(key, text.find(',', key) + 1 - key);
   EXPECT_EQ(run_info_from_json(text, "x", 1).value().config.ties, Ties::Fixed);
+}
+
+// Earlier versions did not state that a task with predecessors is a timer task.
+TEST_F(EventsFile, WithoutAnActivationATaskWithPredecessorsWasATimer) {
+  RunInfo info = example().info;
+  info.workload = parse_workload(
+                      "dags: [{name: d, period: 10ms, tasks: [{name: a, wcet: 1ms}, {name: b, wcet: 1ms, after: a, "
+                      "activation: timer}]}]",
+                      "w.yaml")
+                      .value()
+                      .workload;
+  std::string text = run_info_to_json(info);
+  EXPECT_EQ(run_info_from_json(text, "x", 1).value().workload, info.workload);
+  constexpr std::string_view kStated = "activation: timer, ";
+  ASSERT_NE(text.find(kStated), std::string::npos) << text;
+  text.erase(text.find(kStated), kStated.size());
+  EXPECT_EQ(run_info_from_json(text, "x", 1).value().workload, info.workload);
 }
 
 }  // namespace

@@ -206,8 +206,9 @@ Result<RunInfo> run_info_from_json(std::string_view text, const std::string &fil
     const Json json = Json::parse(text);
     if (!json.is_object()) return file_error(file, line, "the description of the run must be an object");
     RunInfo info = info_from(json);
-    Result<LoadedWorkload> loaded =
-        parse_workload(text_of(json, "workload"), file + " (workload)", {.wcet_optional = true, .waits = true});
+    // Files of earlier versions do not state the activation of timer tasks; this one does wherever it matters.
+    Result<LoadedWorkload> loaded = parse_workload(text_of(json, "workload"), file + " (workload)",
+                                                   {.wcet_optional = true, .waits = true, .timers_by_default = true});
     if (!loaded) return tl::unexpected<Diagnostics>(std::move(loaded.error()));
     info.workload = std::move(loaded->workload);
     info.event_tasks = event_tasks_from(json, info.workload.task_count());

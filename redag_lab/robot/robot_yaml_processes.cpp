@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <iterator>
 
+#include "redag/base/cpu_list.hpp"
 #include "redag/base/text.hpp"
 #include "redag/model/workload_yaml_node.hpp"
 
@@ -115,6 +116,14 @@ void ProcessesReader::read_workload_of(const Node &node, Process &process) {
   }
   process.workload = std::move(loaded->workload);
   process.states_workers = loaded->states_workers;
+  const std::vector<int> &cpus = process.workload->platform.cpus;
+  if (!is_broken_ && !cpus.empty() && cpus != robot_.cpu_sets[process.cpu_set].cpus) {
+    error(node,
+          fmt::format("the workload of process '{}' has other cpus than the process: {}", process.name,
+                      format_cpu_list(cpus)),
+          fmt::format("remove 'cpus:' from its platform, or write 'cpus: {}'",
+                      format_cpu_list(robot_.cpu_sets[process.cpu_set].cpus)));
+  }
   if (process.workload->policy != PolicyKind::Fixed && robot_.policy == PolicyKind::Fixed) {
     warn(node,
          fmt::format("policy of the robot is fixed, but the workload of process '{}' is ordered by {}", process.name,

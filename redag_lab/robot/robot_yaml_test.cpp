@@ -196,7 +196,7 @@ TEST(RobotYaml, AReservationIsABudgetInAPeriod) {
   EXPECT_EQ(with("{budget: 20ms, period: 10ms}"),
             "cart.yaml:17:65: error: the budget of a reservation must be between 1.024us and its period 10ms");
   EXPECT_EQ(with("{budget: 2us, period: 10us}"),
-            "cart.yaml:17:78: error: the period of a reservation must be between 0.1ms and 4s");
+            "cart.yaml:17:78: error: the period of a reservation must be between 100us and 4s");
   EXPECT_EQ(with("{budget: 2ms, period: 10ms, tick: 20ms}"),
             "cart.yaml:17:90: error: the tick is at most 10ms, as no kernel has a longer one");
   EXPECT_EQ(findings(with_threads("{name: t, match: {thread: a}, level: {reservation: {budget: 2ms, period: 9ms}}, "
@@ -223,6 +223,31 @@ TEST(RobotYaml, AProcessHasAWorkerForEachOfItsProcessors) {
   EXPECT_EQ(findings("robot: cart\ncpus: 0-1\n" + std::string(process)), "");
   EXPECT_NE(findings("robot: cart\ncpus: 0\n" + std::string(process)).find("exceeds the capacity of 1 worker"),
             std::string::npos);
+}
+
+TEST(RobotYaml, AWorkloadHasTheProcessorsOfItsProcess) {
+  const auto with = [](const char *cpus) {
+    return findings(
+        "robot: cart\ncpus: 0-1\nprocesses:\n  - name: a\n    match: {name: a}\n    workload:\n"
+        "      platform: {cpus: " +
+        std::string(cpus) + "}\n      dags: [{name: d, tasks: [{name: s, wcet: 1ms, rate: 100Hz}]}]\n");
+  };
+  EXPECT_EQ(with("0-1"), "");
+  EXPECT_EQ(
+      with("[1, 2]"),
+      "cart.yaml:7:7: error: the workload of process 'a' has other cpus than the process: 1-2 (remove 'cpus:' from "
+      "its platform, or write 'cpus: 0-1')");
+}
+
+TEST(RobotYaml, ALevelTakesARateOrAPeriod) {
+  for (const char *rate : {"50Hz", "20ms"}) {
+    const auto loaded = read(with_threads("{name: t, match: {thread: t}, level: {rate: " + std::string(rate) + "}}"));
+    ASSERT_TRUE(loaded) << to_string(loaded.error());
+    EXPECT_EQ(loaded->robot.threads[0].level->rate, 20 * kMillisecond);
+  }
+  EXPECT_NE(
+      findings(with_threads("{name: t, match: {thread: t}, level: {rate: 20}}")).find("error: rate: '20' is not a"),
+      std::string::npos);
 }
 
 TEST(RobotYaml, ReportsMistakesOfFilesInThem) {

@@ -114,7 +114,9 @@ std::optional<Level> ThreadsReader::read_level(const Node &node) {
     is_read = read_reservation(value, level.reservation);
   } else if (find(node, "rate") != nullptr) {
     level.kind = Level::Kind::Rate;
-    is_read = take(node, "rate", level.rate, [this](const Node &at, auto key) { return positive_duration(at, key); });
+    is_read = take(node, "rate", level.rate, [this](const Node &at, auto key) {
+      return parse_rate(at.text) ? rate(at, key) : positive_duration(at, key);
+    });
     if (robot_.policy == PolicyKind::Fixed) {
       error(value, "a rate has no place in an order by policy fixed", "use task, above, below or fifo");
       is_read = false;
