@@ -193,6 +193,13 @@ std::vector<int> usable_cpus() {
   return cpus;
 }
 
+std::optional<int> unusable_cpu(const std::vector<int> &cpus) {
+  const std::vector<int> usable = usable_cpus();
+  const auto bad = std::find_if_not(cpus.begin(), cpus.end(),
+                                    [&](int cpu) { return std::binary_search(usable.begin(), usable.end(), cpu); });
+  return bad == cpus.end() ? std::nullopt : std::optional(*bad);
+}
+
 int available_fifo_priority(int wanted) {
   int found = 0;
   const BlockedSignals inherited;

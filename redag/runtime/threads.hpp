@@ -101,6 +101,9 @@ class ThreadStart {
 /// Processors where the calling thread may run, ascending.
 [[nodiscard]] std::vector<int> usable_cpus();
 
+/// The first of `cpus` where the calling thread may not run; nothing if it may use them all.
+[[nodiscard]] std::optional<int> unusable_cpu(const std::vector<int> &cpus);
+
 /// The highest SCHED_FIFO priority up to `wanted` that this process can really get; 0: none. Tried on a scratch thread,
 /// because rights come from several places (CAP_SYS_NICE, RLIMIT_RTPRIO, the cgroup's real-time share).
 [[nodiscard]] int available_fifo_priority(int wanted);

@@ -9,6 +9,7 @@
 #include <thread>
 #include <utility>
 
+#include "redag/base/cpu_list.hpp"
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/mutex.hpp"
 #include "redag/model/clusters.hpp"
@@ -115,7 +116,13 @@ class Run {
   Result<void> add_instance(const ClusterPart &part, const executors::ExecutorKind *kind, PreemptionMode wanted,
                             std::uint32_t threads) {
     const bool preemptive = kind == nullptr || kind->ours;
-    const std::vector<int> &cpus = part.is_cluster() ? part.cpus : options_.cpus;
+    const std::vector<int> &cpus = options_.cpus.empty() ? part.cpus : options_.cpus;
+    if (const auto missing = runtime::unusable_cpu(part.cpus); missing && options_.cpus.empty()) {
+      return make_error(
+          fmt::format("{} has processor {}, which this process cannot use",
+                      part.is_cluster() ? fmt::format("cluster '{}'", part.name) : "the platform", *missing),
+          fmt::format("change 'cpus:' in the file: usable processors are {}", format_cpu_list(runtime::usable_cpus())));
+    }
     Result<runtime::Setup> setup = runtime::set_up({.preemption = wanted,
                                                     .policy = workload_.policy,
                                                     .ties = workload_.ties,

@@ -3,12 +3,15 @@
 
 #include "redag_lab/run/run_workload.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sched.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "redag/runtime/setup.hpp"
@@ -118,6 +121,42 @@ INSTANTIATE_TEST_SUITE_P(Modes, EveryMode,
                            return std::string(to_string(std::get<0>(instance.param))) + "_" +
                                   std::to_string(std::get<1>(instance.param));
                          });
+
+TEST(RunWorkload, WorkersAreOnTheProcessorsOfThePlatform) {
+  const int cpu = runtime::usable_cpus().back();
+  Workload workload = two_rates(1, PreemptionMode::None);
+  workload.platform.cpus = {cpu};
+  RunOptions options;
+  options.duration = 50 * kMillisecond;
+  std::atomic<int> elsewhere{0};
+  options.bodies = [&](std::vector<runtime::Body> bodies, const Now &) {
+    for (runtime::Body &body : bodies) {
+      body = [&elsewhere, cpu, body = std::move(body)](const runtime::Job &job) {
+        if (sched_getcpu() != cpu) ++elsewhere;
+        return body(job);
+      };
+    }
+    return bodies;
+  };
+  expect_lawful(run(workload, options));
+  EXPECT_EQ(elsewhere, 0);
+}
+
+TEST(RunWorkload, RefusesProcessorsThatTheProcessCannotUse) {
+  Workload workload = two_rates(1, PreemptionMode::None);
+  workload.platform.cpus = {4095};
+  Result<RunResult> result = run_workload(workload, {});
+  ASSERT_FALSE(result);
+  EXPECT_THAT(to_string(result.error()), ::testing::HasSubstr("the platform has processor 4095, which this process "
+                                                              "cannot use (change 'cpus:' in the file: usable "
+                                                              "processors are "));
+  workload.platform.cpus.clear();
+  workload.platform.clusters = {Cluster{"far", 1, {runtime::usable_cpus()[0], 4095}}};
+  for (Dag &dag : workload.dags) dag.cluster = "far";
+  result = run_workload(workload, {});
+  ASSERT_FALSE(result);
+  EXPECT_THAT(to_string(result.error()), ::testing::HasSubstr("cluster 'far' has processor 4095, which this process"));
+}
 
 TEST(RunWorkload, StopsEarlyWhenAskedAndTheTraceIsStillLawful) {
   std::atomic<bool> stop{false};

@@ -104,6 +104,8 @@ class RemedySearch {
     Workload changed = workload_;
     analysis::AnalysisPlatform platform = platform_;
     changed.platform.workers = ++platform.workers;
+    const std::size_t cpus = changed.platform.cpus.size();
+    if (cpus != 0 && changed.platform.workers > cpus) return std::nullopt;
     if (!suffices(changed, platform)) return std::nullopt;
     return fmt::format("workers: {} instead of {}", platform.workers, platform_.workers);
   }

@@ -46,6 +46,10 @@ std::string clusters_text(const Platform &platform) {
   return texts.empty() ? "none" : fmt::format("{}", fmt::join(texts, ", "));
 }
 
+std::string cpus_text(const Platform &platform) {
+  return platform.cpus.empty() ? "any" : format_cpu_list(platform.cpus);
+}
+
 std::string overrun_text(const Task &task) {
   return task.overrun == Overrun::Skip ? "skip" : fmt::format("queue of {}", task.queue_depth);
 }
@@ -61,6 +65,7 @@ class Comparer {
  public:
   void compare(const Workload &a, const Workload &b) {
     add(Kind::Setting, "workers", fmt::format("{}", a.platform.workers), fmt::format("{}", b.platform.workers));
+    add(Kind::Setting, "cpus", cpus_text(a.platform), cpus_text(b.platform));
     add(Kind::Setting, "clusters", clusters_text(a.platform), clusters_text(b.platform));
     add(Kind::Setting, "preemption", to_string(a.platform.preemption), to_string(b.platform.preemption));
     add(Kind::Setting, "policy", to_string(a.policy), to_string(b.policy));

@@ -42,13 +42,14 @@ TEST(Changes, SettingsAndDemandAreToldApart) {
   Workload a = workload(std::string(kA) + kB, "platform: {workers: 2}\n");
   Workload b = a;
   b.platform.workers = 3;
+  b.platform.cpus = {2, 3};
   b.ties = Ties::Fixed;
   b.dags[0].max_active = 1;
   b.dags[0].tasks[0].wcet = 2 * kMillisecond;
   b.dags[1].tasks[0].priority = 4;
-  EXPECT_THAT(texts(a, b), ElementsAre("setting workers: 2 -> 3", "setting ties: share -> fixed",
-                                       "setting max_active of a: none -> 1", "demand wcet of a.s: 1ms -> 2ms",
-                                       "setting priority of b.s: none -> 4"));
+  EXPECT_THAT(texts(a, b), ElementsAre("setting workers: 2 -> 3", "setting cpus: any -> 2-3",
+                                       "setting ties: share -> fixed", "setting max_active of a: none -> 1",
+                                       "demand wcet of a.s: 1ms -> 2ms", "setting priority of b.s: none -> 4"));
 }
 
 TEST(Changes, WhatOnlyOneHas) {

@@ -135,10 +135,11 @@ std::string names_of(const Values &values) {
 }
 
 std::vector<int> read_cpus(Reader &reader) {
-  const Spec spec{"cpu_affinity",
-                  "Processors that the workers may use; empty: all that the process may use (with preemption os, as "
-                  "many of them as there are workers)",
-                  "a list of processors that the process may use"};
+  const Spec spec{
+      "cpu_affinity",
+      "Processors that the workers may use; empty: those of `config`, or all that the process may use (with "
+      "preemption os, as many of them as there are workers)",
+      "a list of processors that the process may use"};
   const ParameterValue value = reader.value(spec, ParameterValue(std::vector<std::int64_t>{}));
   if (value.get_type() != ParameterType::PARAMETER_INTEGER_ARRAY) refuse(spec.name, value, spec.allowed);
   const std::vector<int> usable = redag::runtime::usable_cpus();
@@ -178,7 +179,7 @@ void read_config(rclcpp::Node &node, Reader &reader, ReDAGOptions &options) {
   if (path.empty()) return;
   redag::Result<redag::LoadedWorkload> loaded = redag::load_workload(path, {.wcet_optional = true});
   if (loaded) {
-    // A process has one executor, whose processors are those of `cpu_affinity`.
+    // A process has one executor.
     if (auto one = redag::refuse_clusters(loaded->workload, "the ROS 2 executor"); !one) {
       loaded = tl::unexpected(std::move(one.error()));
     }
@@ -193,6 +194,14 @@ void read_config(rclcpp::Node &node, Reader &reader, ReDAGOptions &options) {
   const redag::Workload &workload = loaded->workload;
   // If the file does not state the number, the parameter counts, and not the format's default.
   if (options.workers == 0 && loaded->states_workers) options.workers = workload.platform.workers;
+  if (options.cpus.empty()) {
+    options.cpus = workload.platform.cpus;
+    if (const auto cpu = redag::runtime::unusable_cpu(options.cpus)) {
+      throw rclcpp::exceptions::InvalidParameterValueException(
+          fmt::format("parameter 'config' is {}, whose platform has processor {}; usable processors are {}", path, *cpu,
+                      fmt::join(redag::runtime::usable_cpus(), ", ")));
+    }
+  }
   if (options.preemption == redag::PreemptionMode::Auto) options.preemption = workload.platform.preemption;
   if (options.policy == redag::PolicyKind::RateMonotonic) options.policy = workload.policy;
   if (options.ties == redag::Ties::Share) options.ties = workload.ties;

@@ -4,6 +4,8 @@
 #include "workload_run.hpp"
 
 #include <fmt/format.h>
+#include <pthread.h>
+#include <sched.h>
 
 #include <algorithm>
 #include <atomic>
@@ -12,6 +14,7 @@
 #include <functional>
 #include <memory>
 #include <numeric>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -113,6 +116,10 @@ class Run {
       }
     }
     if (!errors.empty()) return tl::unexpected(errors);
+    if (const auto cpu = redag::runtime::unusable_cpu(workload_.platform.cpus)) {
+      return redag::make_error(fmt::format("the platform has processor {}, which this process cannot use", *cpu),
+                               "change 'cpus:' in the file");
+    }
     const bool bounded = std::any_of(workload_.dags.begin(), workload_.dags.end(),
                                      [](const redag::Dag &dag) { return dag.max_active > 0; });
     if (bounded && !is_redag(options_.executor)) {
@@ -138,6 +145,7 @@ class Run {
       redag.policy = workload_.policy;
       redag.ties = workload_.ties;
       redag.threads = workers_ + kSpareThreads;
+      redag.cpus = workload_.platform.cpus;
       redag.workload = nodes_->bound_workload();
       redag.trace_capacity = kSchedulerEvents;
       redag.share_order = options_.only_dag > 0 && can_be_os(redag.preemption);
@@ -148,8 +156,20 @@ class Run {
     }
   }
 
+  // rclcpp's executors know no processors. Their threads inherit those of the thread that spins.
+  void pin_peer() {
+    const std::vector<int> &cpus = workload_.platform.cpus;
+    if (redag_ || cpus.empty()) return;
+    cpu_set_t set;
+    CPU_ZERO(&set);
+    for (const int cpu : cpus) CPU_SET(static_cast<std::size_t>(cpu), &set);
+    const int error = pthread_setaffinity_np(pthread_self(), sizeof(set), &set);
+    if (error != 0) throw std::system_error(error, std::generic_category(), "the executor's processors");
+  }
+
   void spin() {
     try {
+      pin_peer();
       executor_->spin();
     } catch (...) {
       const redag::LockGuard guard(failure_lock_);

@@ -67,6 +67,11 @@ class Usage(Case):
             self.expect(redag("simulate", self.cart, "--duration=10s" if "--duration" not in arguments else "--seed=1",
                               *arguments), 2, words)
         self.expect(redag("run", self.cart, "--affinity", "1-"), 2, "list of processors")
+        far = self.write("far.yaml", self.cart.read_text().replace("workers: 1", "cpus: 4095"))
+        self.expect(redag("run", far), 2, "the platform has processor 4095, which this process cannot use", "change 'cpus:'")
+        self.expect(redag("compare", far), 2, "the platform has processor 4095")
+        self.expect(redag("simulate", far, "--duration", "1s"), 0)
+        self.expect(redag("validate", "--strict", far), 0)
         self.expect(redag("simulate", self.cart, "--preemption", "os", "--policy", "edf"), 2, "static policy")
         self.expect(redag("simulate", self.cart, "--executor", "mte-fifo"), 2, "no threads")
 
