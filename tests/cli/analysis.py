@@ -28,7 +28,7 @@ dags:
 SHORT_DEADLINE = """\
 name: short
 platform: {workers: 1, preemption: os}
-# a comment, which is not kept
+# a comment, which is kept
 dags:
   - name: a
     tasks: [{name: t, wcet: 3ms, bcet: 1ms, period: 10ms}]
@@ -400,6 +400,30 @@ class Assign(Case):
         self.assertIn("group: bus", tuned.read_text())
         again = self.expect(redag("assign", tuned, "--check"), 0)
         self.assertIn("nothing to change", again.stdout)
+
+    def test_changes_the_file_in_place(self):
+        text = "# By hand.\n" + SHORT_DEADLINE.replace("dags:\n", "dags:  # all of them\n")
+        tuned = self.folder / "tuned.yaml"
+        self.expect(redag("assign", self.write("short.yaml", text), "-o", tuned), 0, "wrote")
+        written = tuned.read_text()
+        body_of = [line for line in written.splitlines() if not re.match("# [a-z]+: \"", line)]
+        self.assertEqual([line for line in body_of if not line.startswith("policy:")],
+                         [line for line in text.splitlines() if not line.startswith("policy:")])
+        self.assertIn("policy: deadline_monotonic", body_of)
+        again = self.folder / "again.yaml"
+        self.expect(redag("assign", tuned, "-o", again), 0, f"wrote {again}: the unchanged workload")
+        self.assertEqual(again.read_bytes(), tuned.read_bytes())
+        self.expect(redag("assign", tuned, "--ties", "fixed", "-o", again), 0)
+        self.assertEqual(again.read_text().count("# created: "), 1)
+        self.assertIn("ties: fixed\n", again.read_text())
+
+    def test_an_unchanged_workload_is_the_same_file(self):
+        written = "# Cart.\n" + self.cart.read_text().replace("wcet: 25ms", "wcet: 25.0ms")
+        file = self.write("cart2.yaml", written)
+        for command in (["assign"], ["tune", "--vary", "order"]):
+            same = self.folder / "same.yaml"
+            self.expect(redag(*command, file, "-o", same), 0, f"wrote {same}: the unchanged workload")
+            self.assertEqual(same.read_text(), written)
 
     def test_audsley(self):
         # J. Lehoczky, RTSS 1990: deadlines beyond periods, where neither order by rates nor by deadlines works.

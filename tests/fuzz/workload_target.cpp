@@ -6,6 +6,7 @@
 #include "redag/base/check.hpp"
 #include "redag/model/callback_match.hpp"
 #include "redag/model/workload_yaml.hpp"
+#include "redag/model/workload_yaml_edit.hpp"
 #include "tests/fuzz/targets.hpp"
 
 namespace redag::fuzz {
@@ -28,6 +29,15 @@ void load(std::string_view input, LoadOptions options) {
   const Result<LoadedWorkload> again = parse_workload(text, "again.yaml", options);
   REDAG_CHECK(again.has_value(), "what was written can be read");
   REDAG_CHECK(again->workload == workload, "what was written is read as it was");
+  REDAG_CHECK(edit_yaml(input, workload, options) == input, "an unchanged file stays as it is");
+  Workload changed = workload;
+  changed.policy = PolicyKind::Fixed;
+  for (Dag &dag : changed.dags) {
+    dag.max_active = dag.max_active == 0 ? 3 : 0;
+    for (Task &task : dag.tasks) task.priority = 7;
+  }
+  const Result<LoadedWorkload> edited = parse_workload(edit_yaml(input, changed, options), "edited.yaml", options);
+  REDAG_CHECK(edited.has_value() && edited->workload == changed, "an edited file states what it has to");
   CallbackMatcher matcher(workload);
   for (const TaskRef &ref : flatten(workload)) {
     if (!ref.task->callback) continue;

@@ -5,8 +5,6 @@
 
 #include <memory>
 
-#include "redag/base/provenance.hpp"
-#include "redag/model/workload_yaml.hpp"
 #include "redag_lab/cli/analyze/analysis_arguments.hpp"
 #include "redag_lab/cli/analyze/assignment_report.hpp"
 #include "redag_lab/cli/analyze/placement_report.hpp"
@@ -43,20 +41,9 @@ Result<lab::Assignment> search(const Workload &workload, const analysis::Analysi
   return found;
 }
 
-bool write_result(const AssignOptions &options, const Workload &workload, bool is_changed, Console &console) {
-  if (options.output.empty()) return true;
-  const Result<void> written =
-      write_text(options.output, provenance_to_comment(current_provenance()) + to_yaml(workload));
-  if (!written) {
-    console.note(written.error());
-    return false;
-  }
-  console.note(fmt::format("wrote {}{}\n", options.output, is_changed ? "" : ": the unchanged workload"));
-  return true;
-}
-
 // With clusters: finds the clusters of the DAGs that name none.
-int assign_clusters(const Workload &workload, const AssignOptions &options, Console &console) {
+int assign_clusters(const Workload &workload, const std::string &source, const AssignOptions &options,
+                    Console &console) {
   for (const CLI::Option *option : options.of_search) {
     if (option->count() == 0) continue;
     console.error(fmt::format("{}: 'assign' only chooses clusters for a workload with clusters", option->get_name()),
@@ -83,13 +70,14 @@ int assign_clusters(const Workload &workload, const AssignOptions &options, Cons
     console.say(describe(*placement, console.out_traits()));
   }
   if (!placement->left_over.empty()) return kExitNo;
-  if (!write_result(options, placement->workload, !placement->placed.empty(), console)) return kExitBad;
+  if (!write_changed(options.output, source, placement->workload, console)) return kExitBad;
   return options.analysis.run.check && !placement->is_schedulable() ? kExitNo : kExitOk;
 }
 
 int assign_file(const AssignOptions &options, Console &console) {
+  std::string source;
   const std::optional<Workload> workload =
-      load_configured(options.analysis.run, console, {.cluster_optional = true, .waits = true}, "assign");
+      load_configured(options.analysis.run, console, {.cluster_optional = true, .waits = true}, "assign", &source);
   if (!workload) return kExitBad;
   if (!options.output.empty()) {
     if (const Result<void> writable = check_output(options.output); !writable) {
@@ -97,7 +85,7 @@ int assign_file(const AssignOptions &options, Console &console) {
       return kExitBad;
     }
   }
-  if (!workload->platform.clusters.empty()) return assign_clusters(*workload, options, console);
+  if (!workload->platform.clusters.empty()) return assign_clusters(*workload, source, options, console);
   Assigned assigned;
   const Result<analysis::AnalysisPlatform> platform = platform_for(*workload, options.analysis);
   if (!platform) {
@@ -122,8 +110,7 @@ int assign_file(const AssignOptions &options, Console &console) {
   } else {
     console.say(describe(assigned, console.out_traits(), options.analysis.run.all_tasks));
   }
-  const bool is_changed = !changes(assigned.assignment).empty();
-  if (!write_result(options, assigned.assignment.best.workload, is_changed, console)) return kExitBad;
+  if (!write_changed(options.output, source, assigned.assignment.best.workload, console)) return kExitBad;
   return options.analysis.run.check && !assigned.assignment.best.score.schedulable ? kExitNo : kExitOk;
 }
 
@@ -135,7 +122,8 @@ Action add_assign(CLI::App &app) {
   app.add_option("FILE", options->analysis.run.file, "Workload file (YAML); - reads standard input")
       ->type_name("WORKLOAD")
       ->required();
-  app.add_option("-o,--output", options->output, "File for the workload with the best assignment; comments are lost")
+  app.add_option("-o,--output", options->output,
+                 "File for the workload with the best assignment: FILE with its changes")
       ->type_name("FILE");
   add_choice(
       app, "--objective", assignment.objective, choices_of(std::array{lab::Objective::Lateness, lab::Objective::Slack}),

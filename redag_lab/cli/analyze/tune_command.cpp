@@ -7,10 +7,8 @@
 #include <charconv>
 #include <memory>
 
-#include "redag/base/provenance.hpp"
 #include "redag/base/text.hpp"
 #include "redag/model/validate.hpp"
-#include "redag/model/workload_yaml.hpp"
 #include "redag_lab/cli/analyze/tuning_report.hpp"
 #include "redag_lab/cli/run/run_arguments.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
@@ -92,18 +90,6 @@ std::optional<lab::Tuned> search(const Workload &workload, lab::TuneOptions opti
   return lab::tune(workload, options);
 }
 
-int write(const std::string &path, const lab::Tuned &tuned, Console &console) {
-  if (path.empty()) return kExitOk;
-  const Result<void> written =
-      write_text(path, provenance_to_comment(current_provenance()) + to_yaml(tuned.best.workload));
-  if (!written) {
-    console.note(written.error());
-    return kExitBad;
-  }
-  console.note(fmt::format("wrote {}{}\n", path, tuned.changed() ? "" : ": the unchanged workload"));
-  return kExitOk;
-}
-
 int tune_file(const TuneOptions &options, Console &console) {
   Tuning tuning;
   tuning.options = options.tune;
@@ -119,7 +105,8 @@ int tune_file(const TuneOptions &options, Console &console) {
       !parse_caps(options.caps, tuning.options.freedom, console)) {
     return kExitBad;
   }
-  const std::optional<Workload> workload = load_without_clusters(options.run, "tune", console);
+  std::string source;
+  const std::optional<Workload> workload = load_without_clusters(options.run, "tune", console, &source);
   if (!workload) return kExitBad;
   if (!options.output.empty()) {
     if (const Result<void> writable = check_output(options.output); !writable) {
@@ -151,8 +138,8 @@ int tune_file(const TuneOptions &options, Console &console) {
   } else {
     console.say(describe(tuning, console.out_traits(), options.all_trials));
   }
-  if (const int status = write(options.output, tuning.tuned, console); status != kExitOk) return status;
   const lab::SettingCandidate &best = tuning.tuned.best;
+  if (!write_changed(options.output, source, best.workload, console)) return kExitBad;
   const bool missed = best.score.all().missed + best.held_out.all().missed > 0;
   return options.run.check && missed ? kExitNo : kExitOk;
 }
@@ -165,7 +152,8 @@ Action add_tune(CLI::App &app) {
   app.add_option("FILE", options->run.file, "Workload file (YAML); - reads standard input")
       ->type_name("WORKLOAD")
       ->required();
-  app.add_option("-o,--output", options->output, "File for the tuned workload; comments are lost")->type_name("FILE");
+  app.add_option("-o,--output", options->output, "File for the tuned workload: FILE with its changes")
+      ->type_name("FILE");
   const auto objective = [](lab::Objective value) { return std::pair(std::string(objective_name(value)), value); };
   add_choice(app, "--objective", tune.goal.objective,
              Choices<lab::Objective>{objective(lab::Objective::Misses), objective(lab::Objective::Lateness),

@@ -13,6 +13,7 @@
 #include "redag/model/clusters.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/model/workload_yaml.hpp"
+#include "redag/model/workload_yaml_edit.hpp"
 #include "redag/runtime/threads.hpp"
 #include "redag/trace/trace.hpp"
 #include "redag_analysis/executors/executors.hpp"
@@ -128,8 +129,8 @@ void add_thread_arguments(CLI::App &app, RunArguments &arguments) {
 }
 
 std::optional<Workload> load_configured(const RunArguments &arguments, Console &console, LoadOptions options,
-                                        const char *changed_by) {
-  Result<robot::Input> input = load_workload_or_robot(arguments.file, options);
+                                        const char *changed_by, std::string *source) {
+  Result<robot::Input> input = load_workload_or_robot(arguments.file, options, source);
   if (!input) {
     console.note(input.error());
     return std::nullopt;
@@ -175,14 +176,47 @@ std::optional<Workload> load_configured(const RunArguments &arguments, Console &
   return std::nullopt;
 }
 
-std::optional<Workload> load_without_clusters(const RunArguments &arguments, const char *command, Console &console) {
-  std::optional<Workload> workload = load_configured(arguments, console, {.waits = true}, command);
+std::optional<Workload> load_without_clusters(const RunArguments &arguments, const char *command, Console &console,
+                                              std::string *source) {
+  std::optional<Workload> workload = load_configured(arguments, console, {.waits = true}, command, source);
   if (!workload) return std::nullopt;
   if (const Result<void> one = refuse_clusters(*workload, command); !one) {
     console.note(one.error());
     return std::nullopt;
   }
   return workload;
+}
+
+namespace {
+
+/// Returns `text` without the comment of the command that wrote it.
+std::string_view without_provenance(std::string_view text) {
+  const std::string comment = provenance_to_comment({});
+  std::string_view keys = comment;  // '# created: ""' and so on, in the order in which they are written
+  if (!text.starts_with(keys.substr(0, keys.find('"') + 1))) return text;
+  while (!keys.empty()) {
+    const std::string_view key = keys.substr(0, keys.find('"') + 1);
+    if (text.starts_with(key)) text.remove_prefix(std::min(text.find('\n'), text.size() - 1) + 1);
+    keys.remove_prefix(keys.find('\n') + 1);
+  }
+  return text;
+}
+
+}  // namespace
+
+bool write_changed(const std::string &path, const std::string &source, const Workload &workload, Console &console) {
+  if (path.empty()) return true;
+  const std::string changed = edit_yaml(source, workload, {.cluster_optional = true, .waits = true});
+  const bool is_unchanged = changed == source;
+  const Result<void> written = write_text(
+      path,
+      is_unchanged ? source : provenance_to_comment(current_provenance()) + std::string(without_provenance(changed)));
+  if (!written) {
+    console.note(written.error());
+    return false;
+  }
+  console.note(fmt::format("wrote {}{}\n", path, is_unchanged ? ": the unchanged workload" : ""));
+  return true;
 }
 
 bool takes_arguments(const std::vector<lab::Variant> &variants, const RunArguments &arguments, Console &console) {
@@ -253,11 +287,9 @@ std::optional<lab::SessionOptions> session_options(const RunArguments &arguments
       return std::nullopt;
     }
     options.cpus = *cpus;
-    const std::vector<int> usable = runtime::usable_cpus();
-    const auto is_usable = [&](int cpu) { return std::binary_search(usable.begin(), usable.end(), cpu); };
-    if (const auto bad = std::find_if_not(cpus->begin(), cpus->end(), is_usable); bad != cpus->end()) {
+    if (const std::optional<int> bad = runtime::unusable_cpu(*cpus)) {
       console.error(fmt::format("--affinity: this process is not allowed to use processor {}", *bad),
-                    fmt::format("allowed: {}", fmt::join(usable, ", ")));
+                    fmt::format("allowed: {}", fmt::join(runtime::usable_cpus(), ", ")));
       return std::nullopt;
     }
   }

@@ -66,12 +66,18 @@ void add_thread_arguments(CLI::App &app, RunArguments &arguments);
 
 /// Returns the workload of `arguments.file` with the changes of the command line, and prints warnings and errors.
 /// Returns nothing if the workload cannot be run. `changed_by` names a command that changes tasks; it cannot use a
-/// robot with links, whose jitter depends on all tasks.
+/// robot with links, whose jitter depends on all tasks. Leaves the text of the file in `source`, if that is given.
 [[nodiscard]] std::optional<Workload> load_configured(const RunArguments &arguments, Console &console,
-                                                      LoadOptions options = {}, const char *changed_by = nullptr);
+                                                      LoadOptions options = {}, const char *changed_by = nullptr,
+                                                      std::string *source = nullptr);
 /// The same for a command that changes tasks and cannot use a workload with clusters.
 [[nodiscard]] std::optional<Workload> load_without_clusters(const RunArguments &arguments, const char *command,
-                                                            Console &console);
+                                                            Console &console, std::string *source = nullptr);
+
+/// Writes `workload`, a change of the one that `source` states, to the file `path`, and says so. Keeps the rest of the
+/// text. Nothing happens without a path. Returns false after printing an error.
+[[nodiscard]] bool write_changed(const std::string &path, const std::string &source, const Workload &workload,
+                                 Console &console);
 
 /// Returns false, with an error, if the command line requests a mode, a policy or workers that none of the executors
 /// takes.

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "redag/model/text_file.hpp"
+#include "redag/model/workload_yaml_node.hpp"
 #include "redag/trace/output_file.hpp"
 
 namespace redag::cli {
@@ -37,12 +38,13 @@ Result<std::string> read_input_text(const std::string &path, const char *what) {
   return path == "-" ? read_standard_input() : read_text_file(path, what, kMaxWorkloadBytes);
 }
 
-Result<robot::Input> load_workload_or_robot(const std::string &path, LoadOptions options) {
-  if (path != "-") return robot::load_input(path, options);
-  Result<std::string> text = read_standard_input();
+Result<robot::Input> load_workload_or_robot(const std::string &path, LoadOptions options, std::string *source) {
+  Result<std::string> text = read_input_text(path, "a workload file");
   if (!text) return tl::unexpected<Diagnostics>(std::move(text.error()));
-  Result<robot::Input> input = robot::parse_input(*text, "<stdin>", options);
-  if (input && input->workload && input->workload->workload.name.empty()) input->workload->workload.name = "stdin";
+  const bool is_file = path != "-";
+  Result<robot::Input> input = robot::parse_input(*text, is_file ? path : "<stdin>", options);
+  if (input && input->workload) name_after(is_file ? path : "stdin", input->workload->workload);
+  if (source != nullptr) *source = *std::move(text);
   return input;
 }
 

@@ -13,7 +13,8 @@ namespace redag::cli {
 /// Returns the text of a file, or of standard input if `path` is "-". `what` names the kind of file in messages.
 [[nodiscard]] Result<std::string> read_input_text(const std::string &path, const char *what);
 
-/// Reads a file, or standard input if `path` is "-".
-[[nodiscard]] Result<robot::Input> load_workload_or_robot(const std::string &path, LoadOptions options = {});
+/// Reads a file, or standard input if `path` is "-". Leaves its text in `source`, if that is given.
+[[nodiscard]] Result<robot::Input> load_workload_or_robot(const std::string &path, LoadOptions options = {},
+                                                          std::string *source = nullptr);
 
 }  // namespace redag::cli
