@@ -161,7 +161,9 @@ void write_task(Writer &out, const Platform &platform, const Dag &dag, const Tas
   } else if (task.period != implied_period) {
     write_duration(out, Field::Period, task.period);
   }
+  if (task.phase == Phase::Event) write(out, Field::Activation, kEventActivation);
   if (task.deadline != task.period) write_duration(out, Field::Deadline, task.deadline);
+  if (task.phase == Phase::Unknown) write(out, Field::Offset, kAnyOffset);
   write_duration(out, Field::Offset, task.offset);
   write_duration(out, Field::Jitter, task.jitter);
   write_duration(out, Field::Region, task.region);
