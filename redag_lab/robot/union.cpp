@@ -43,6 +43,7 @@ class Union {
     }
     if (!mistakes_.empty()) return tl::unexpected<Diagnostics>(std::move(mistakes_));
     set_platform();
+    set_phases();
     if (order_.is_merged() || has_above_ || robot_.by_bounds) fix_priorities();
     Diagnostics found = validate(workload_, options);
     if (has_errors(found)) return tl::unexpected<Diagnostics>(std::move(found));
@@ -73,12 +74,52 @@ class Union {
       Dag &dag = workload_.dags.emplace_back(original);
       dag.name = joined(process.name, dag.name);
       dag.cluster = {};
+      dag.executor = next_executor_;
       for (Task &task : dag.tasks) {
         if (!task.group.empty()) task.group = joined(process.name, task.group);
       }
       set_of_dag_.push_back(process.cpu_set);
     }
     levels_.insert(levels_.end(), order_.of_task[p].begin(), order_.of_task[p].end());
+    ++next_executor_;
+  }
+
+  // Nothing synchronises the timers of a process with data of others, or with threads that execute a task.
+  void set_phases() {
+    std::vector<Task *> tasks;
+    for (Dag &dag : workload_.dags) {
+      for (Task &task : dag.tasks) tasks.push_back(&task);
+    }
+    const std::vector<TaskRef> refs = flatten(workload_);
+    for (std::size_t p = 0; p < robot_.processes.size(); ++p) {
+      const std::size_t count = robot_.processes[p].workload ? robot_.processes[p].workload->task_count() : 0;
+      for (std::size_t t = 0; t < count; ++t) {
+        Task &task = *tasks[first_task_[p] + t];
+        const bool is_source = task.activation == Activation::Timer && task.predecessors.empty();
+        if (is_source && task.phase == Phase::Common && is_of_threads(robot_, p, TaskId(t)))
+          set_free(task, Phase::Unknown);
+      }
+    }
+    for (const Link &link : robot_.links)
+      set_free(*tasks[first_task_[link.to.process] + link.to.task.value], Phase::Unknown);
+    // Data of events come by events, over as many links as there are.
+    for (bool changed = true; changed;) {
+      changed = false;
+      for (const Link &link : robot_.links) {
+        Task &to = *tasks[first_task_[link.to.process] + link.to.task.value];
+        const Dag &dag = workload_.dags[refs[first_task_[link.from.process] + link.from.task.value].dag.value];
+        const bool has_events = std::any_of(dag.tasks.begin(), dag.tasks.end(),
+                                            [](const Task &task) { return task.phase == Phase::Event; });
+        if (!has_events || to.phase == Phase::Event) continue;
+        to.phase = Phase::Event;
+        changed = true;
+      }
+    }
+  }
+
+  static void set_free(Task &task, Phase phase) {
+    task.phase = phase;
+    task.offset = 0;
   }
 
   // Within its process, an executor decides which jobs the kernel gets to choose from.
@@ -187,6 +228,7 @@ class Union {
     Dag &dag = workload_.dags.emplace_back();
     dag.name = joined(kThreads, threads.name);
     dag.is_foreign = true;
+    dag.executor = next_executor_++;
     ++starters_;
     for (std::uint32_t i = 0; i < threads.count; ++i) {
       task.name = threads.count == 1 ? "run" : fmt::format("run_{}", i + 1);
@@ -256,8 +298,9 @@ class Union {
   std::vector<std::size_t> first_task_;  // by process: the first of its tasks in the union
   std::vector<std::optional<std::size_t>> first_of_threads_;
   std::map<std::size_t, std::size_t> reserved_;  // by CPU set: threads with reservations
-  std::size_t starters_ = 0;                     // what starts jobs without knowing of the others
-  bool has_above_ = false;                       // some task is above all levels of the order
+  std::uint32_t next_executor_ = 0;
+  std::size_t starters_ = 0;  // what starts jobs without knowing of the others
+  bool has_above_ = false;    // some task is above all levels of the order
 };
 
 }  // namespace
