@@ -177,6 +177,7 @@ class Union {
     const Threads &threads = robot_.threads[t];
     if (!threads.level) return;
     if (threads.level->kind == Level::Kind::Task) {
+      check_alone(threads);
       const Process &process = robot_.processes[threads.level->task.process];
       if (threads.cpus.empty() || threads.cpus == robot_.cpu_sets[process.cpu_set].cpus) return;
       refuse(threads.place,
@@ -198,6 +199,26 @@ class Union {
     task.wcet = threads.wcet;
     task.period = task.deadline = threads.period;
     add_interference(t, *set, task, order_.of_threads[t] ? static_cast<int>(*order_.of_threads[t]) : kAbove);
+  }
+
+  // Only an executor keeps what a task shares with others.
+  void check_alone(const Threads &threads) {
+    const TaskOf &of = threads.level->task;
+    const Workload &workload = *robot_.processes[of.process].workload;
+    const TaskRef ref = flatten(workload)[of.task.value];
+    const Dag &dag = workload.dags[ref.dag.value];
+    const bool has_successor = std::any_of(dag.tasks.begin(), dag.tasks.end(), [&](const Task &task) {
+      return std::find(task.predecessors.begin(), task.predecessors.end(), ref.index) != task.predecessors.end();
+    });
+    const char *shared = !ref.task->group.empty()                           ? "a group"
+                         : dag.max_active > 0                               ? "a max_active"
+                         : !ref.task->predecessors.empty() || has_successor ? "edges"
+                                                                            : nullptr;
+    if (shared == nullptr) return;
+    refuse(threads.place,
+           fmt::format("threads '{}' execute task '{}', which has {}: only an executor would keep to that",
+                       threads.name, of.name, shared),
+           "give the threads a task without that, in a DAG of its own");
   }
 
   // The bound for one of them assumes that it has a processor whenever the kernel lets it run.

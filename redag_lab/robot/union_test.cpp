@@ -135,6 +135,22 @@ TEST(RobotUnion, TasksOfThreadsHaveClocksOfTheirOwn) {
   EXPECT_EQ(united->workload.dags[0].tasks[1].phase, Phase::Unknown);
 }
 
+TEST(RobotUnion, ThreadsExecuteNoTaskThatSharesWhatAnExecutorKeeps) {
+  const auto refusal_of = [](Dag dag) {
+    Robot robot = robot_of({make_workload({std::move(dag)}, 2, PreemptionMode::Os)});
+    robot.threads.push_back(threads_at(Level::Kind::Task, 0, 0));
+    robot.threads[0].level->task = {0, TaskId(0), "p0.d.a"};
+    return refusal(robot);
+  };
+  EXPECT_EQ(refusal_of(make_dag("d", {{.name = "a", .period = 5}})), "accepted");
+  EXPECT_EQ(refusal_of(make_dag("d", {{.name = "a", .period = 5, .group = "g"}})),
+            "cart.yaml:30:5: error: threads 'x' execute task 'p0.d.a', which has a group: only an executor would keep "
+            "to that (give the threads a task without that, in a DAG of its own)");
+  EXPECT_NE(refusal_of(make_dag("d", {{.name = "a", .period = 5}}, 1)).find("has a max_active"), std::string::npos);
+  EXPECT_NE(refusal_of(make_dag("d", {{.name = "a", .period = 5}, {.name = "b", .after = {0}}})).find("has edges"),
+            std::string::npos);
+}
+
 TEST(RobotUnion, EachProcessHasAClockAndAHiModeOfItsOwn) {
   Workload high = one_task(10, 2);
   high.dags[0].criticality = Criticality::High;
