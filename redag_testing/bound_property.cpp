@@ -119,12 +119,16 @@ void simulate_run(const BoundCase &bound_case, const analysis::TaskSet &task_set
         task_set.dags[static_cast<std::size_t>(&dag - workload.dags.data())].units;
     const bool joins_rates =
         std::any_of(units.begin(), units.end(), [&](std::uint32_t u) { return !task_set.units[u].awaits.empty(); });
+    const bool has_clocks =
+        std::any_of(dag.tasks.begin(), dag.tasks.end(), [](const Task &task) { return task.phase != Phase::Common; });
     for (Task &task : dag.tasks) {
       unit_of.push_back(task_set.tasks[unit_of.size()].unit);
-      can_pause.push_back(!joins_rates);
-      if (joins_rates) {
-        // The analysis uses these offsets; they move together.
-        if (task.activation == Activation::Timer) task.offset += run.offsets[units.front()];
+      can_pause.push_back(!joins_rates || task.phase == Phase::Event);
+      if (joins_rates && task.phase != Phase::Common) {
+        task.offset = run.offsets[unit_of.back()] % task.period;
+      } else if (joins_rates) {
+        // The analysis uses these offsets; they move together. Sources of other clocks move against them.
+        if (task.activation == Activation::Timer && !has_clocks) task.offset += run.offsets[units.front()];
       } else if (task.activation == Activation::Timer) {
         task.offset = run.offsets[unit_of.back()];
       }
@@ -284,6 +288,15 @@ void check_one(const analysis::Method &method, const BoundGenerator &generator, 
   }
 }
 
+const char *phase_text(const Task &task) {
+  switch (task.phase) {
+    case Phase::Unknown: return "free timer";
+    case Phase::Event: return kEventActivation;
+    case Phase::Common: break;
+  }
+  return to_string(task.activation);
+}
+
 }  // namespace
 
 std::uint64_t how_many(std::uint64_t usual) {
@@ -370,10 +383,9 @@ std::string describe(const BoundCase &bound_case) {
     text += fmt::format("dag {} max_active={} deadline={}\n", dag.name, dag.max_active, dag.deadline);
     for (const Task &task : dag.tasks) {
       text += fmt::format("  {} {} C={} T={} D={} J={} O={} region={} queue={} priority={} group='{}' after=[{}]\n",
-                          task.name, task.activation == Activation::Timer ? "timer" : "data", task.wcet, task.period,
-                          task.deadline, task.jitter, task.offset, task.region,
-                          task.overrun == Overrun::Queue ? task.queue_depth : 0, task.priority.value_or(0), task.group,
-                          fmt::join(task.predecessors, ","));
+                          task.name, phase_text(task), task.wcet, task.period, task.deadline, task.jitter, task.offset,
+                          task.region, task.overrun == Overrun::Queue ? task.queue_depth : 0, task.priority.value_or(0),
+                          task.group, fmt::join(task.predecessors, ","));
       for (const Wait &wait : task.waits) {
         text +=
             fmt::format("    waits after {} for {} at {}\n", wait.after, wait.longest,

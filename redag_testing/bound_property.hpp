@@ -42,6 +42,7 @@ struct BoundCaseLimits {
   bool edges = false;            // each DAG has one rate, data tasks and aligned timers; otherwise tasks are
                                  // independent
   bool rates = false;            // with edges: tasks of a DAG have several periods and offsets
+  bool phases = true;            // with edges: sometimes nothing synchronises the sources of a DAG
   std::uint32_t max_dags = 6;    // with edges; otherwise the number of tasks, a DAG each or a few to a DAG
   std::uint32_t max_tasks = 5;   // of a DAG
   double min_utilization = 0.3;  // per worker

@@ -279,6 +279,7 @@ class Checker {
       check_wcet_low(dag, task);
       check_execution(task);
       check_activation(task);
+      check_phase(dag, task);
       check_options(task);
       check_group_in_cluster(id, task);
       check_callback(task);
@@ -429,6 +430,34 @@ class Checker {
                  fmt::format("sample {} of task '{}' is not between its bcet and its wcet", format_duration(sample),
                              task.name))
           .item = static_cast<std::uint32_t>(i);
+    }
+  }
+
+  // Nothing can wait, job by job, for a source that nothing synchronises with it.
+  void check_phase(const Dag &dag, const Task &task) {
+    const bool is_event = task.phase == Phase::Event;
+    const char *has = !task.predecessors.empty()            ? "predecessors"
+                      : task.activation == Activation::Data ? "'activation: data'"
+                      : task.offset != 0                    ? "an offset"
+                                                            : nullptr;
+    if (task.phase != Phase::Common && has != nullptr) {
+      findings_.error(
+          is_event ? Field::Activation : Field::Offset, FieldSet(Field::Activation) | Field::After | Field::Offset,
+          fmt::format("task '{}' is released {}, and has {}", task.name, is_event ? "by events" : "at any offset", has),
+          is_event ? "remove it, or use 'activation: timer' or data" : "state its offset");
+    }
+    if (task.activation != Activation::Timer) return;
+    for (std::uint32_t k = 0; k < task.predecessors.size(); ++k) {
+      if (task.predecessors[k] >= dag.tasks.size()) continue;
+      const Task &from = dag.tasks[task.predecessors[k]];
+      if (from.phase == Phase::Common || from.period != task.period || from.offset != task.offset) continue;
+      findings_
+          .error(Field::After, FieldSet(Field::Period) | Field::Offset | Field::Activation,
+                 fmt::format("timer task '{}' waits for jobs of '{}' that are released at the same instants, but "
+                             "nothing synchronises the two",
+                             task.name, from.name),
+                 "use 'activation: data'")
+          .item = k;
     }
   }
 

@@ -24,6 +24,13 @@ enum class Activation : std::uint8_t {
   Data,   // when every predecessor has completed once more since this task's last job (AND-join)
 };
 
+/// What the releases of a timer task have in common with those of the others.
+enum class Phase : std::uint8_t {
+  Common,   // one clock: at offset + k * period from an instant that all tasks of an executor share
+  Unknown,  // periodic as well, but nothing synchronises it with the others
+  Event,    // from outside, at least a period apart: nothing bounds how long none comes
+};
+
 /// What happens to releases while earlier jobs of the same task are unfinished.
 enum class Overrun : std::uint8_t {
   Skip,   // at most one job waits; the next release replaces (skips) it if it has not started
@@ -92,6 +99,7 @@ struct Task {
   Duration wcet_low = 0;  // C(LO) of a task of a high-criticality DAG, <= wcet = C(HI); 0: none
   Criticality criticality = Criticality::Normal;
   Activation activation = Activation::Timer;
+  Phase phase = Phase::Common;  // of a timer task
   Overrun overrun = Overrun::Skip;
   std::uint32_t queue_depth = 1;            // for Overrun::Queue, >= 1
   std::optional<int> priority;              // for PolicyKind::Fixed; larger is more urgent
@@ -130,6 +138,8 @@ struct Dag {
   Degrade degrade;           // only used if the DAG is not of high criticality
   std::string cluster = {};  // name of the cluster that serves it; empty: the only one, or the whole platform
   bool is_foreign = false;   // stands for threads of other programs, which have no deadline to meet
+  /// Which of several executors starts its jobs. Each has its own clock and its own HI mode.
+  std::uint32_t executor = 0;
 
   /// Its share of U (eq. utilization). Tasks without a period have none.
   [[nodiscard]] double utilization() const;
@@ -223,6 +233,10 @@ void inherit_periods(Dag &dag);
 
 [[nodiscard]] const char *to_string(Criticality value);
 [[nodiscard]] const char *to_string(Activation value);
+
+/// How a file states the phases of a task: `activation: event`, `offset: any`.
+inline constexpr const char *kEventActivation = "event";
+inline constexpr const char *kAnyOffset = "any";
 [[nodiscard]] const char *to_string(Callback::Kind value);
 [[nodiscard]] const char *to_string(OnBudget value);
 [[nodiscard]] const char *to_string(PolicyKind value);

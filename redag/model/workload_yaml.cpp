@@ -43,7 +43,17 @@ constexpr std::array kTaskFields = {
 
 constexpr std::array kCriticalities = {Criticality::Low, Criticality::Normal, Criticality::High};
 constexpr std::array kOnBudgets = {OnBudget::Abort, OnBudget::Log, OnBudget::Demote, OnBudget::SkipNext};
-constexpr std::array kActivations = {Activation::Timer, Activation::Data};
+/// `activation` in a file says what releases a task, and of a timer task whether it is a timer at all.
+enum class Released : std::uint8_t { ByTimer, ByData, ByEvent };
+constexpr std::array kReleased = {Released::ByTimer, Released::ByData, Released::ByEvent};
+const char *to_string(Released value) {
+  switch (value) {
+    case Released::ByData: return to_string(Activation::Data);
+    case Released::ByEvent: return kEventActivation;
+    case Released::ByTimer: break;
+  }
+  return to_string(Activation::Timer);
+}
 constexpr std::array kPolicies = {PolicyKind::RateMonotonic, PolicyKind::DeadlineMonotonic,
                                   PolicyKind::Fixed,         PolicyKind::Edf,
                                   PolicyKind::Fifo,          PolicyKind::ChainAware};
@@ -259,7 +269,7 @@ class Reader : private yaml::ValueReader {
     take_wcet(task, part);
     take_duration(part, Field::Bcet, task.bcet);
     take_positive_duration(part, Field::Deadline, task.deadline);
-    take_duration(part, Field::Offset, task.offset);
+    take_offset(task, part);
     take_duration(part, Field::Jitter, task.jitter);
     take_positive_duration(part, Field::Region, task.region);
     take_positive_duration(part, Field::Budget, task.budget);
@@ -268,7 +278,7 @@ class Reader : private yaml::ValueReader {
     take_count(part, Field::Concurrency, task.concurrency, kMaxConcurrency);
     take_text(part, Field::Group, task.group);
     take_criticality(task, part);
-    take_enum(part, Field::Activation, task.activation, kActivations);
+    take_activation(task, part);
     take(part, Field::Priority, task.priority, [this](const Node &value, std::string_view key) {
       return integer<int>(value, key, std::numeric_limits<int>::min());
     });
@@ -277,6 +287,22 @@ class Reader : private yaml::ValueReader {
     take(part, Field::Execution, task.execution,
          [this](const Node &value, std::string_view) { return execution(value); });
     take(part, Field::Callback, task.callback, [this](const Node &value, std::string_view) { return callback(value); });
+  }
+
+  void take_activation(Task &task, TaskPart &part) {
+    Released released = Released::ByTimer;
+    take_enum(part, Field::Activation, released, kReleased);
+    if (released == Released::ByData) task.activation = Activation::Data;
+    if (released == Released::ByEvent) task.phase = Phase::Event;
+  }
+
+  void take_offset(Task &task, TaskPart &part) {
+    const Node *node = find(part, Field::Offset);
+    if (node != nullptr && node->kind == Node::Kind::Scalar && node->text == kAnyOffset) {
+      task.phase = Phase::Unknown;
+    } else {
+      take_duration(part, Field::Offset, task.offset);
+    }
   }
 
   /// The scheduler only uses the DAG's criticality. Warns if a task has another one, which would have no effect.

@@ -195,6 +195,25 @@ TEST(ParseWorkload, ReadsTheProcessorsOfThePlatform) {
             "'workers: 2': bounds and simulations assume a processor for each worker)");
 }
 
+TEST(ParseWorkload, ReadsWhatSourcesCountFrom) {
+  const Workload workload = read(R"(
+dags:
+  - name: d
+    period: 10ms
+    tasks:
+      - {name: scan, wcet: 1ms, activation: event}
+      - {name: imu, wcet: 1ms, offset: any, jitter: 1ms}
+      - {name: clock, wcet: 1ms}
+)");
+  const std::vector<Task> &tasks = workload.dags.at(0).tasks;
+  EXPECT_EQ(tasks[0].phase, Phase::Event);
+  EXPECT_EQ(tasks[0].activation, Activation::Timer);
+  EXPECT_EQ(tasks[0].period, 10 * kMillisecond);
+  EXPECT_EQ(tasks[1].phase, Phase::Unknown);
+  EXPECT_EQ(tasks[2].phase, Phase::Common);
+  EXPECT_EQ(parse_workload(to_yaml(workload), "again").value().workload, workload);
+}
+
 TEST(ParseWorkload, BcetMeansUniformUnlessSaidOtherwise) {
   const Workload workload = read(R"(dags: [{name: d, period: 10ms, tasks: [
     {name: a, wcet: 2ms, bcet: 1ms}, {name: b, wcet: 2ms, bcet: 1ms, execution: constant},

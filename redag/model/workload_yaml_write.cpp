@@ -176,7 +176,9 @@ void write_task(Writer &out, const Platform &platform, const Dag &dag, const Tas
     write(out, Field::Activation, to_string(task.activation));
   }
   if (has_period) write_period(out, task.period);
+  if (task.phase == Phase::Event) write(out, Field::Activation, kEventActivation);
   if (task.deadline != task.period) write_duration(out, Field::Deadline, task.deadline);
+  if (task.phase == Phase::Unknown) write(out, Field::Offset, kAnyOffset);
   write_duration(out, Field::Offset, task.offset);
   write_duration(out, Field::Jitter, task.jitter);
   write_duration(out, Field::Region, task.region);

@@ -52,6 +52,7 @@ EventHandle DagBuilder::event(std::string name, nanoseconds min_interval, TaskBo
   Task task;
   task.name = std::move(name);
   task.period = min_interval.count();
+  task.phase = Phase::Event;
   const auto source = std::make_shared<EventSource>(place, task.period, options.early);
   const TaskHandle handle = append(std::move(task), "event", {}, std::move(body), options);
   sources_.back() = source;

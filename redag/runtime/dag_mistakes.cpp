@@ -57,14 +57,17 @@ std::string text_in_quotes(std::string_view text) {
 }
 
 // The member of DagBuilder that made a task.
-const char *call_of(const Task &task, bool is_event) { return is_event ? "event" : to_string(task.activation); }
+const char *call_of(const Task &task) {
+  return task.phase == Phase::Event ? kEventActivation : to_string(task.activation);
+}
 
-std::string remedy_for(const Finding &finding, const Task *task, bool is_event) {
+std::string remedy_for(const Finding &finding, const Task *task) {
   if (task != nullptr && finding.field == Field::After) {
-    return task->activation == Activation::Data ? "change the second argument of data()" : "TaskOptions::after";
+    return task->activation == Activation::Data ? "change the second argument of data()"
+                                                : "change TaskOptions::after, or use data()";
   }
   if (task != nullptr && finding.field == Field::Period) {
-    return is_event ? "change the second argument of event()" : "change the second argument of timer()";
+    return fmt::format("change the second argument of {}()", call_of(*task));
   }
   const auto find = [&](const auto &remedies) -> std::string {
     const auto *const found = std::find_if(remedies.begin(), remedies.end(),
@@ -74,16 +77,15 @@ std::string remedy_for(const Finding &finding, const Task *task, bool is_event) 
   return task != nullptr ? find(kTaskRemedies) : find(kDagRemedies);
 }
 
-std::string describe(const Finding &finding, const Dag &dag, const std::vector<bool> &events) {
+std::string describe(const Finding &finding, const Dag &dag) {
   const Task *task = finding.task == Finding::kNone ? nullptr : &dag.tasks[finding.task];
-  const bool is_event = task != nullptr && events[finding.task];
   std::string message = finding.message;
   // In a file a period of 0 means that it is absent. Here the caller passed it.
   if (task != nullptr && finding.field == Field::Period && task->period == 0)
-    message = is_event ? "the minimum interval must be greater than 0" : "the period must be greater than 0";
-  const std::string place =
-      task == nullptr ? place_of(dag.name) : place_of(dag.name, call_of(*task, is_event), task->name);
-  const std::string remedy = remedy_for(finding, task, is_event);
+    message = task->phase == Phase::Event ? "the minimum interval must be greater than 0"
+                                          : "the period must be greater than 0";
+  const std::string place = task == nullptr ? place_of(dag.name) : place_of(dag.name, call_of(*task), task->name);
+  const std::string remedy = remedy_for(finding, task);
   return printable(fmt::format("{}: {}{}", place, message, remedy.empty() ? "" : " (" + remedy + ")"));
 }
 
@@ -95,7 +97,7 @@ std::string place_of(std::string_view dag, std::string_view call, std::string_vi
   return fmt::format("{}.{}({})", place_of(dag), call, text_in_quotes(task));
 }
 
-std::string mistakes_of(const Dag &dag, const std::vector<bool> &is_event, PolicyKind policy) {
+std::string mistakes_of(const Dag &dag, PolicyKind policy) {
   Workload alone;
   alone.platform = Platform{1, PreemptionMode::None};
   alone.policy = policy;
@@ -106,25 +108,12 @@ std::string mistakes_of(const Dag &dag, const std::vector<bool> &is_event, Polic
   std::string text;
   const auto add = [&](const std::string &mistake) { text += (text.empty() ? "" : "\n") + mistake; };
   for (const Finding &finding : find_mistakes(alone)) {
-    if (finding.severity == Severity::Error) add(describe(finding, dag, is_event));
+    if (finding.severity == Severity::Error) add(describe(finding, dag));
   }
-  for (std::size_t i = 0; i < dag.tasks.size(); ++i) {
-    const Task &task = dag.tasks[i];
-    const std::string place = place_of(dag.name, call_of(task, is_event[i]), task.name);
-    if (task.overrun != Overrun::Queue && task.queue_depth != 1) {
-      add(place +
-          ": TaskOptions::queue_depth has no effect without a queue (set TaskOptions::overrun to Overrun::Queue)");
-    }
-    if (task.activation != Activation::Timer) continue;
-    // Such tasks would be aligned (docs/model.md): job k would wait for a job with the very same release.
-    for (const std::uint32_t predecessor : task.predecessors) {
-      const Task &event = dag.tasks[predecessor];
-      if (!is_event[predecessor] || event.period != task.period || event.offset != task.offset) continue;
-      add(
-          fmt::format("{}: it waits for jobs of {} that are released at the same instants, which an event cannot "
-                      "promise (use data(), or set TaskOptions::offset)",
-                      place, text_in_quotes(event.name)));
-    }
+  for (const Task &task : dag.tasks) {
+    if (task.overrun == Overrun::Queue || task.queue_depth == 1) continue;
+    add(place_of(dag.name, call_of(task), task.name) +
+        ": TaskOptions::queue_depth has no effect without a queue (set TaskOptions::overrun to Overrun::Queue)");
   }
   return text;
 }

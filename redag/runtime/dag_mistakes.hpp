@@ -7,7 +7,6 @@
 
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "redag/model/workload.hpp"
 
@@ -17,8 +16,7 @@ namespace redag::runtime {
 [[nodiscard]] std::string place_of(std::string_view dag);
 [[nodiscard]] std::string place_of(std::string_view dag, std::string_view call, std::string_view task);
 
-/// Returns each mistake in `dag` on a line of its own; empty if there is none. A wcet may be unknown (0). `is_event`:
-/// by task, whether it was made by event().
-[[nodiscard]] std::string mistakes_of(const Dag &dag, const std::vector<bool> &is_event, PolicyKind policy);
+/// Returns each mistake in `dag` on a line of its own; empty if there is none. A wcet may be unknown (0).
+[[nodiscard]] std::string mistakes_of(const Dag &dag, PolicyKind policy);
 
 }  // namespace redag::runtime

@@ -181,10 +181,10 @@ TEST(EventRelease, MistakesAreToldInTheWordsOfTheBuilder) {
   aligned.event("zero", 0ms, [] {});
   EXPECT_EQ(
       refusal_of([&] { executor.add(std::move(aligned)); }),
-      "Executor::add(): DagBuilder(\"aligned\").event(\"zero\"): the minimum interval must be greater than 0 (change "
-      "the second argument of event())\n"
-      "DagBuilder(\"aligned\").timer(\"timer\"): it waits for jobs of \"source\" that are released at the same "
-      "instants, which an event cannot promise (use data(), or set TaskOptions::offset)");
+      "Executor::add(): DagBuilder(\"aligned\").timer(\"timer\"): timer task 'timer' waits for jobs of 'source' that "
+      "are released at the same instants, but nothing synchronises the two (change TaskOptions::after, or use data())\n"
+      "DagBuilder(\"aligned\").event(\"zero\"): the minimum interval must be greater than 0 (change the second "
+      "argument of event())");
 }
 
 }  // namespace

@@ -53,7 +53,7 @@ void state_waits(Task &task, std::uint32_t most, Duration longest) {
 DagId Executor::Impl::add(Dag dag, std::vector<TaskBody> task_bodies, Sources sources) {
   inherit_periods(dag);
   const std::vector<bool> is_event = events_among(sources);
-  if (const std::string mistakes = mistakes_of(dag, is_event, options_.policy); !mistakes.empty()) {
+  if (const std::string mistakes = mistakes_of(dag, options_.policy); !mistakes.empty()) {
     refuse("Executor::add(): " + mistakes);
   }
 
@@ -241,7 +241,7 @@ trace::RunInfo Executor::Impl::run_info() const {
       state_wcet(task, figures.usage.longest);
       state_waits(task, figures.most_waits, figures.longest_waits);
       if (added.sources[i] != nullptr) info.event_tasks.emplace_back(position);
-      if (task.activation == Activation::Timer) task.offset += added.base;
+      if (task.activation == Activation::Timer && task.phase == Phase::Common) task.offset += added.base;
     }
     info.workload.dags.push_back(std::move(dag));
   }

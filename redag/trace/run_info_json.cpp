@@ -141,6 +141,20 @@ std::vector<TaskId> event_tasks_from(const Json &json, std::size_t task_count) {
   return tasks;
 }
 
+// Files of earlier versions state events by `event_tasks` alone, as timers.
+void mark_events(RunInfo &info) {
+  std::vector<Task *> tasks;
+  for (Dag &dag : info.workload.dags) {
+    for (Task &task : dag.tasks) tasks.push_back(&task);
+  }
+  for (const TaskId id : info.event_tasks) {
+    Task &task = *tasks[id.value];
+    if (task.activation != Activation::Timer) continue;
+    task.phase = Phase::Event;
+    task.offset = 0;
+  }
+}
+
 RunInfo info_from(const Json &json) {
   RunInfo info;
   info.executor = text_of(json, "executor");
@@ -212,6 +226,7 @@ Result<RunInfo> run_info_from_json(std::string_view text, const std::string &fil
     if (!loaded) return tl::unexpected<Diagnostics>(std::move(loaded.error()));
     info.workload = std::move(loaded->workload);
     info.event_tasks = event_tasks_from(json, info.workload.task_count());
+    mark_events(info);
     return info;
   } catch (const BadValue &error) {
     return file_error(file, line, error.what());

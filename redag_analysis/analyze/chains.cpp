@@ -66,6 +66,10 @@ std::variant<NotApplicable, ChainBound> chain_bound(const TaskSet &task_set, std
     }
     const CompiledTask &task = task_set.tasks[chain[i].value];
     const ResponseBound *response = response_of(task_set, chain[i], bound);
+    if (task.has_gaps) {
+      return NotApplicable{"task '" + task.name +
+                           "' is released by events, and nothing bounds the time until the next"};
+    }
     if (response == nullptr) return NotApplicable{"task '" + task.name + "' has no response bound"};
     if (*response->response > task.period) {
       return NotApplicable{"task '" + task.name +

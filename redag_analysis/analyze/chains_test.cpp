@@ -288,6 +288,18 @@ Duration let_by_force(const std::vector<LetTask> &chain, Time from, Time until) 
   return longest;
 }
 
+TEST(Chain, NothingBoundsTheTimeUntilTheNextEvent) {
+  Workload workload =
+      testing::make_workload({testing::make_dag("a", {{"s", 10}}), testing::make_dag("b", {{"y", 10}})});
+  workload.dags[1].tasks[0].phase = Phase::Event;
+  const TaskSet task_set = testing::compiled(workload);
+  const std::vector<TaskId> chain = {TaskId(0), TaskId(1)};
+  const auto outcome = chain_bound(task_set, chain, tightest_of(analyze(task_set)));
+  ASSERT_TRUE(std::holds_alternative<NotApplicable>(outcome));
+  EXPECT_EQ(std::get<NotApplicable>(outcome).reason,
+            "task 'b.y' is released by events, and nothing bounds the time until the next");
+}
+
 TEST(Chain, LetIsExact) {
   for (std::uint64_t seed = 0; seed < 200; ++seed) {
     Rng rng(mix(seed));

@@ -4,8 +4,6 @@
 #include "redag_analysis/core/jobs_in_progress.hpp"
 
 #include <algorithm>
-#include <map>
-#include <utility>
 #include <vector>
 
 #include "redag_analysis/core/effort.hpp"
@@ -69,12 +67,15 @@ class Antichain {
 }  // namespace
 
 std::size_t most_jobs_in_progress(const TaskSet &task_set, DagId dag) {
-  std::map<std::pair<Duration, Duration>, std::vector<std::uint32_t>> grids;
+  std::vector<std::vector<std::uint32_t>> grids;
   for (const std::uint32_t t : task_set.dags[dag.value].tasks) {
-    grids[{task_set.tasks[t].period, task_set.tasks[t].offset}].push_back(t);
+    const auto grid = std::find_if(grids.begin(), grids.end(), [&](const std::vector<std::uint32_t> &tasks) {
+      return is_released_with(task_set.tasks[tasks.front()], task_set.tasks[t]);
+    });
+    grid == grids.end() ? grids.push_back({t}) : grid->push_back(t);
   }
   std::size_t most = 0;
-  for (const auto &[grid, tasks] : grids) most += Antichain(task_set, tasks).size();
+  for (const std::vector<std::uint32_t> &tasks : grids) most += Antichain(task_set, tasks).size();
   return most;
 }
 

@@ -11,7 +11,7 @@
 
 namespace redag::analysis {
 
-/// Sums, over the grids (period and offset), the largest set of tasks of which none follows another. Tasks of one grid
+/// Sums, over the grids (is_released_with()), the largest set of tasks of which none follows another. Tasks of one grid
 /// answer before its next point, and therefore those in progress belong to one point. In a grid with a single task or
 /// without edges, responses above the period do no harm: jobs of a task still never overlap. O(tasks^3). Proof:
 /// docs/analysis.md, "Jobs in progress".

@@ -15,7 +15,14 @@ namespace {
 
 constexpr std::string_view kFasterThanData =
     "a predecessor has a larger period than this task, so data is missing for some jobs, which are skipped by design";
-constexpr std::string_view kNoData = "a predecessor of another rate has no bound";
+constexpr std::string_view kNoData = "a predecessor that is released apart from this task has no bound";
+constexpr std::string_view kNoOrder =
+    "nothing synchronises its timer with a predecessor of the same period, so data is missing for some jobs, which are "
+    "skipped";
+constexpr std::string_view kNoRate =
+    "it joins data of a shorter period that come by events, and nothing bounds the time until the next";
+constexpr std::string_view kNoAge =
+    "it joins data that come by events, and nothing bounds how long other data wait for the next";
 constexpr std::string_view kLateData = "data of its predecessors can arrive after its next release";
 constexpr std::string_view kGaveUp = "gave up: waiting times and response times did not converge in a thousand steps";
 constexpr std::string_view kBinds =
@@ -24,7 +31,8 @@ constexpr std::string_view kFewThreads = "fewer threads than tasks are only know
 
 constexpr int kMaxRounds = 1000;
 
-// What a waiting unit knows of a predecessor: data of its job k arrive within [offset + k period, ... + response].
+// What a waiting unit knows of a predecessor on a grid of the same clock: data of its job k arrive within [offset + k
+// period, ... + response].
 struct Data {
   Duration period = 0;
   Duration offset = 0;
@@ -65,6 +73,7 @@ class Resolver {
   }
 
   Outcome run() {
+    gaps_.assign(task_set_.units.size(), std::nullopt);
     for (int round = 0; update_waits(round); ++round) {
       Outcome outcome = apply_(alone_);
       const Bound *bound = std::get_if<Bound>(&outcome);
@@ -73,6 +82,7 @@ class Resolver {
       for (std::uint32_t u = 0; u < task_set_.units.size(); ++u) {
         responses_[u] = absent_[u].empty() ? of_unit(u).response : std::nullopt;
       }
+      gaps_.assign(task_set_.units.size(), std::nullopt);
     }
     return result();
   }
@@ -128,10 +138,60 @@ class Resolver {
     return changed;
   }
 
+  [[nodiscard]] const CompiledTask &first_of(std::uint32_t u) const {
+    return task_set_.tasks[task_set_.units[u].tasks.front()];
+  }
+
+  // True if the unit is released by a data task that joins several clocks, and so has a grid of its own.
+  [[nodiscard]] bool joins_clocks(std::uint32_t u) const {
+    const std::vector<std::uint32_t> &awaits = task_set_.units[u].awaits;
+    return first_of(u).data && !awaits.empty() && task_set_.tasks[awaits.front()].clock != first_of(u).clock;
+  }
+
+  // In each interval (t, t + gap] a job of the unit completes; kUnbounded if nothing says so.
+  Duration gap_of(std::uint32_t u) {
+    if (gaps_[u]) return *gaps_[u];
+    const Unit &unit = task_set_.units[u];
+    Duration gap = 0;
+    if (joins_clocks(u)) {
+      for (const std::uint32_t p : unit.awaits) gap = std::max(gap, gap_of(task_set_.tasks[p].unit));
+      gap = add(gap, found_.tasks.empty() ? unit.length : from_ready(u));
+    } else {
+      gap = first_of(u).has_gaps || !responses_[u] ? kUnbounded : add(unit.period, *responses_[u]) - 1;
+    }
+    gaps_[u] = gap;
+    return gap;
+  }
+
+  // The wait where nothing synchronises the predecessors with each other or with the unit's own timer. `seen` is the
+  // latest arrival of data, and of its own timer, after their own grid points.
+  std::optional<Duration> wait_for_clocks(std::uint32_t u) {
+    const CompiledTask &first = first_of(u);
+    Duration seen = task_set_.units[u].jitter;
+    Duration between = 0;  // the longest time between two data of a shorter period
+    for (const std::uint32_t p : task_set_.units[u].awaits) {
+      const CompiledTask &before = task_set_.tasks[p];
+      if (before.period < first.period) {
+        between = std::max(between, gap_of(before.unit));
+      } else if (first.data || is_released_with(before, first)) {
+        seen = std::max(seen, *responses_[before.unit]);
+      } else {
+        absent_[u] = kNoOrder;
+        return std::nullopt;
+      }
+    }
+    if (between == kUnbounded) {
+      absent_[u] = kNoRate;
+      return std::nullopt;
+    }
+    return between <= first.period ? std::max(seen, between) : add(seen, between);
+  }
+
   // Returns the wait of a unit; sets absent_ if there is none.
   std::optional<Duration> wait_of(std::uint32_t u) {
     const Unit &unit = task_set_.units[u];
-    const CompiledTask &first = task_set_.tasks[unit.tasks.front()];
+    const CompiledTask &first = first_of(u);
+    bool is_one_clock = true;
     Duration seen = unit.jitter;
     std::vector<Data> others;
     for (const std::uint32_t p : unit.awaits) {
@@ -145,13 +205,14 @@ class Resolver {
         absent_[u] = kNoData;
         return std::nullopt;
       }
-      if (before.period == unit.period && before.offset == unit.offset) {
+      is_one_clock = is_one_clock && before.clock == first.clock;
+      if (is_released_with(before, first)) {
         seen = std::max(seen, *response);
       } else {
         others.push_back(Data{before.period, before.offset, *response});
       }
     }
-    return wait_for(unit, seen, others);
+    return is_one_clock ? wait_for(unit, seen, others) : wait_for_clocks(u);
   }
 
   // The jitter that explains how many jobs become ready in any interval, for any responses. It is at least the period.
@@ -240,27 +301,41 @@ class Resolver {
     }
   }
 
-  // How long before its grid point the data of a unit's job can have been released.
+  // How long before its grid point the data of a unit's job can have been released. Of a unit that joins clocks: how
+  // long before it became ready.
   Duration age_of(std::uint32_t u) {
     if (ages_[u]) return *ages_[u];
-    const Unit &unit = task_set_.units[u];
     Duration age = 0;
-    for (const std::uint32_t p : unit.awaits) {
+    for (const std::uint32_t p : task_set_.units[u].awaits) {
       const std::uint32_t before = task_set_.tasks[p].unit;
-      const Duration origin = age_of(before);
-      age = std::max(age, is_on_grid(u, p) ? origin : add(origin, oldest(before)));
+      Duration since = 0;
+      if (joins_clocks(u)) {
+        since = std::min(oldest(before), add(at_most_after(before), longest_other(u, p)));
+      } else if (!is_released_with(task_set_.tasks[p], first_of(u))) {
+        since = oldest(before);
+      }
+      age = std::max(age, add(age_of(before), since));
     }
     ages_[u] = age;
     return age;
   }
 
-  [[nodiscard]] bool is_on_grid(std::uint32_t u, std::uint32_t task) const {
-    const CompiledTask &before = task_set_.tasks[task];
-    return before.period == task_set_.units[u].period && before.offset == task_set_.units[u].offset;
+  // The longest time from the point that age_of() counts to, to the end of the unit.
+  [[nodiscard]] Duration at_most_after(std::uint32_t u) const {
+    return joins_clocks(u) ? from_ready(u) : *responses_[u];
+  }
+
+  // A datum that is taken waits for data of the other predecessors, for the next of each at most.
+  Duration longest_other(std::uint32_t u, std::uint32_t predecessor) {
+    Duration longest = 0;
+    for (const std::uint32_t p : task_set_.units[u].awaits) {
+      if (p != predecessor) longest = std::max(longest, gap_of(task_set_.tasks[p].unit));
+    }
+    return longest;
   }
 
   // The greatest age of a predecessor's latest datum. The next one arrives later, or at the same instant after it.
-  [[nodiscard]] Duration oldest(std::uint32_t u) const { return add(task_set_.units[u].period, *responses_[u]); }
+  Duration oldest(std::uint32_t u) { return joins_clocks(u) ? gap_of(u) : add(gap_of(u), 1); }
 
   ResponseBound end_to_end(std::uint32_t dag) {
     ResponseBound worst;
@@ -273,17 +348,30 @@ class Resolver {
       }
       ResponseBound bound = of_unit(u);
       if (!unit.awaits.empty()) {
-        Duration response = 0;
-        for (const std::uint32_t p : unit.awaits) {
-          const std::uint32_t before = task_set_.tasks[p].unit;
-          const Duration since_data = is_on_grid(u, p) ? *responses_[u] : add(from_ready(u), oldest(before));
-          response = std::max(response, add(since_data, age_of(before)));
+        const Duration response = since_origin(u);
+        if (response >= kUnbounded) {
+          worst = ResponseBound{};
+          worst.absent = kNoAge;
+          return worst;
         }
         bound = with_wait(u, response);
       }
       if (!worst.response || *bound.response > *worst.response) worst = bound;
     }
     return worst;
+  }
+
+  // From the release of the earliest data behind a job of the unit to its end.
+  Duration since_origin(std::uint32_t u) {
+    if (joins_clocks(u)) return add(from_ready(u), age_of(u));
+    Duration longest = 0;
+    for (const std::uint32_t p : task_set_.units[u].awaits) {
+      const std::uint32_t before = task_set_.tasks[p].unit;
+      const bool is_on_grid = is_released_with(task_set_.tasks[p], first_of(u));
+      const Duration since_data = is_on_grid ? *responses_[u] : add(from_ready(u), oldest(before));
+      longest = std::max(longest, add(since_data, age_of(before)));
+    }
+    return longest;
   }
 
   const TaskSet &task_set_;
@@ -293,6 +381,7 @@ class Resolver {
   std::vector<std::optional<Duration>> responses_;  // by unit
   std::vector<std::string_view> absent_;            // by unit: why it has no wait
   std::vector<std::optional<Duration>> ages_;
+  std::vector<std::optional<Duration>> gaps_;  // by unit; of the latest round
   Bound found_;
 };
 
@@ -304,7 +393,7 @@ bool shares_max_active(const TaskSet &task_set) {
 }  // namespace
 
 std::optional<std::string> why_not_directly(const TaskSet &task_set) {
-  if (task_set.has_rate_edges()) return "edges join tasks of different periods or offsets: see the bounds for DAGs";
+  if (task_set.has_rate_edges()) return "edges join tasks that are not released together: see the bounds for DAGs";
   if (task_set.threads_suffice_if_bounded)
     return "there are fewer threads than tasks: see the bounds on response times";
   return std::nullopt;

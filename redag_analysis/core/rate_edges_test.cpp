@@ -229,6 +229,109 @@ TEST(RateEdges, WhatCannotBindIsNoObstacle) {
   for (const ResponseBound &none : bound_of(dag_bounded(), compiled(slow, 2)).tasks) EXPECT_FALSE(none.response);
 }
 
+// Two sources of one period feed a task.
+Workload two_sources(Phase first, Phase second, std::uint32_t workers) {
+  Workload workload = make_workload(
+      {make_dag("d", {{.name = "x", .period = 10}, {.name = "y", .period = 10}, {.name = "j", .after = {0, 1}}})},
+      workers, PreemptionMode::Os);
+  workload.dags[0].tasks[0].phase = first;
+  workload.dags[0].tasks[1].phase = second;
+  return workload;
+}
+
+// y at 0 ends at 1. x at 9.9 ends at 10.9, and then j runs on y's data of 0. Every 10 ms anew.
+TEST(RateEdges, SourcesOfTwoClocksAreNotReleasedTogether) {
+  const TaskSet together = compiled(two_sources(Phase::Common, Phase::Common, 2), 2);
+  EXPECT_FALSE(together.has_rate_edges());
+  EXPECT_EQ(milliseconds(bound_of(melani(), together).dags[0]), 2);
+  for (const Phase phase : {Phase::Unknown, Phase::Event}) {
+    const TaskSet task_set = compiled(two_sources(phase, Phase::Common, 2), 2);
+    ASSERT_EQ(task_set.units.size(), 3U);
+    const Bound bound = bound_of(melani(), task_set);
+    // x and y answer within 1 + 1, as three tasks share two workers, and j does so from when it is ready.
+    EXPECT_EQ(milliseconds(bound.tasks[0]), 2);
+    EXPECT_EQ(milliseconds(bound.tasks[2]), 2);
+    // Data of y are at most 10 + 2 old. Those of x wait for them for 11.999999 ms at most.
+    EXPECT_EQ(milliseconds(bound.dags[0]), phase == Phase::Event ? 15 : 14);
+    for (const MethodReport &report : analyze(task_set).methods) {
+      const Bound *other = report.trusted ? report.bound() : nullptr;
+      if (other == nullptr || other->dags.empty() || !other->dags[0].response) continue;
+      EXPECT_GE(*other->dags[0].response, 11'900'000) << report.method->name;
+    }
+  }
+}
+
+// Nothing bounds how long one event waits for the other.
+TEST(RateEdges, TwoEventsThatAreJoinedHaveNoBoundEndToEnd) {
+  const TaskSet task_set = compiled(two_sources(Phase::Event, Phase::Event, 2), 2);
+  const Bound bound = bound_of(melani(), task_set);
+  EXPECT_EQ(milliseconds(bound.tasks[2]), 2) << "from its own release";
+  EXPECT_FALSE(bound.dags[0].response);
+  EXPECT_THAT(bound.dags[0].absent, ::testing::HasSubstr("how long other data wait"));
+  Workload workload = two_sources(Phase::Event, Phase::Common, 2);
+  workload.dags[0].tasks[1].period = workload.dags[0].tasks[2].period = 30 * kMillisecond;
+  const Bound fast = bound_of(melani(), compiled(workload, 2));
+  EXPECT_FALSE(fast.tasks[2].response);
+  EXPECT_THAT(fast.tasks[2].absent, ::testing::HasSubstr("a shorter period that come by events"));
+}
+
+// A timer whose data come from another clock is ready once per period only if they come more often.
+TEST(RateEdges, ATimerWaitsForDataOfAnotherClock) {
+  const auto bound = [](Duration fast) {
+    Workload workload =
+        make_workload({make_dag("d", {{.name = "x", .period = fast}, {.name = "z", .period = 20, .after = {0}}})}, 2,
+                      PreemptionMode::Os);
+    workload.dags[0].tasks[0].phase = Phase::Unknown;
+    workload.dags[0].tasks[1].offset = kMillisecond;
+    return bound_of(melani(), compiled(workload, 2)).tasks[1];
+  };
+  // Data every 5 ms, 1 ms late at most: z is ready within 5.999999 ms. It shares two workers with one job of x.
+  EXPECT_EQ(bound(5).response, 5'999'999 + 1'500'000);
+  EXPECT_FALSE(bound(20).response);
+  EXPECT_THAT(bound(20).absent, ::testing::HasSubstr("nothing synchronises its timer"));
+}
+
+// Tasks that follow a join of two clocks are released with it: they are one unit.
+TEST(RateEdges, WhatFollowsAJoinOfTwoClocksIsItsUnit) {
+  Workload workload = two_sources(Phase::Unknown, Phase::Unknown, 2);
+  Task last = workload.dags[0].tasks[2];
+  last.name = "last";
+  last.predecessors = {2};
+  workload.dags[0].tasks.push_back(last);
+  const TaskSet task_set = compiled(workload, 2);
+  EXPECT_EQ(task_set.units.size(), 3U);
+  EXPECT_EQ(task_set.tasks[2].unit, task_set.tasks[3].unit);
+  const Bound bound = bound_of(melani(), task_set);
+  ASSERT_TRUE(bound.dags[0].response);
+  EXPECT_EQ(*bound.dags[0].response, 10'000'000 + 2'500'000 + 3'000'000);
+}
+
+// Each ROS timer counts from when its node created it, and messages come when another process sends them.
+TEST(RateEdges, CallbacksOfRosHaveNoCommonClock) {
+  constexpr auto kFusion = R"(
+platform: {workers: 2, preemption: os}
+dags:
+  - name: fusion
+    tasks:
+      - {name: scan, wcet: 1ms, period: 50ms, callback: {node: /lidar, subscription: /scan}}
+      - {name: imu, wcet: 1ms, period: 50ms, callback: {node: /imu, timer: 50ms}}
+      - {name: fuse, wcet: 1ms, activation: data, after: [scan, imu], callback: {node: /fuse, subscription: /x}}
+)";
+  Workload workload = parse_workload(kFusion, "w.yaml").value().workload;
+  EXPECT_EQ(milliseconds(bound_of(melani(), compiled(workload, 2)).dags[0]), 50 + 2 + 2);
+  workload.dags[0].tasks[0].callback->kind = Callback::Kind::Service;
+  EXPECT_EQ(compiled(workload, 2).tasks[0].has_gaps, true);
+}
+
+// A timer of each process: no time at which both begin is known.
+TEST(RateEdges, ExecutorsHaveNoCommonClock) {
+  Workload workload = two_sources(Phase::Common, Phase::Common, 2);
+  workload.dags.push_back(make_dag("e", {{.name = "z", .period = 10}}));
+  EXPECT_EQ(compiled(workload, 2).tasks[3].clock, compiled(workload, 2).tasks[0].clock);
+  workload.dags[1].executor = 1;
+  EXPECT_NE(compiled(workload, 2).tasks[3].clock, compiled(workload, 2).tasks[0].clock);
+}
+
 TEST(RateEdges, OtherMethodsRefuseThem) {
   const Workload workload =
       make_workload({make_dag("d", {{.name = "a", .period = 5}, {.name = "b", .period = 10, .after = {0}}})}, 1);

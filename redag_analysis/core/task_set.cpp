@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <map>
 #include <numeric>
+#include <set>
 #include <utility>
 
+#include "redag/model/modes.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/sched/policy.hpp"
 #include "redag_analysis/core/arithmetic.hpp"
@@ -43,6 +45,7 @@ class Compiler {
     for (const Dag &dag : workload_.dags) add_dag(dag);
     assign_ranks();
     keep_shared_groups();
+    for (const Dag &dag : workload_.dags) next_clock_ = std::max(next_clock_, dag.executor + 1);
     for (std::uint32_t d = 0; d < task_set_.dags.size(); ++d) {
       find_grids(d);
       form_units(d);
@@ -52,6 +55,7 @@ class Compiler {
     }
     check_sums();
     check_threads();
+    separate_modes();
     if (lost_.per_second >= kSecond) refuse("stalls, releases and preemptions leave no processor time");
     task_set_.has_modes = task_set_.not_analysable.empty() && !modes_.empty() && waits_.empty();
     if (!modes_.empty()) refuse(std::move(modes_));
@@ -153,6 +157,16 @@ class Compiler {
     task_set_.dags.push_back(std::move(compiled));
   }
 
+  // HI mode is that of one executor. Others go on as before, and so does all their work.
+  void separate_modes() {
+    task_set_.has_separate_modes = has_separate_modes(workload_);
+    if (!task_set_.has_separate_modes) return;
+    const std::set<std::uint32_t> with_modes = executors_with_modes(workload_);
+    for (std::uint32_t d = 0; d < task_set_.dags.size(); ++d) {
+      if (!with_modes.contains(workload_.dags[d].executor)) task_set_.dags[d].high = true;
+    }
+  }
+
   CompiledTask compile_task(const Dag &dag, const Task &task, std::uint32_t first) {
     const AnalysisPlatform &platform = task_set_.platform;
     CompiledTask compiled;
@@ -252,7 +266,7 @@ class Compiler {
               [&](std::uint32_t a, std::uint32_t b) { return ranks[a - first] < ranks[b - first]; });
     const bool edges = std::any_of(order.begin(), order.end(),
                                    [&](std::uint32_t t) { return !task_set_.tasks[t].predecessors.empty(); });
-    if (edges && is_released_together(dag, order)) return {order};
+    if (edges && is_released_together(order)) return {order};
 
     const std::vector<std::vector<std::uint32_t>> parts = connected_parts(order);
     std::vector<std::vector<std::uint32_t>> lists;
@@ -290,9 +304,8 @@ class Compiler {
 
   [[nodiscard]] bool joins_rates(std::uint32_t t) const {
     const CompiledTask &task = task_set_.tasks[t];
-    return std::any_of(task.predecessors.begin(), task.predecessors.end(), [&](std::uint32_t p) {
-      return task_set_.tasks[p].period != task.period || task_set_.tasks[p].offset != task.offset;
-    });
+    return std::any_of(task.predecessors.begin(), task.predecessors.end(),
+                       [&](std::uint32_t p) { return !is_released_with(task_set_.tasks[p], task); });
   }
 
   // True if the part is released as a whole: it has no rate edges, or all of it follows the one task that waits.
@@ -303,37 +316,62 @@ class Compiler {
   }
 
   // Sets the grids of a DAG's tasks, in topological order. A timer has its own grid. A data task has that of its
-  // predecessor with the largest period; of several, the one with the latest offset.
+  // predecessor with the largest period; of several, the one with the latest offset. If its predecessors are of several
+  // clocks, it has one of its own.
   void find_grids(std::uint32_t dag) {
+    const Dag &stated = workload_.dags[dag];
     const std::uint32_t first = task_set_.dags[dag].tasks.empty() ? 0 : task_set_.dags[dag].tasks.front();
-    const std::vector<std::uint32_t> ranks = topological_ranks(workload_.dags[dag]);
+    const std::vector<std::uint32_t> ranks = topological_ranks(stated);
     std::vector<std::uint32_t> order = task_set_.dags[dag].tasks;
     std::sort(order.begin(), order.end(),
               [&](std::uint32_t a, std::uint32_t b) { return ranks[a - first] < ranks[b - first]; });
     for (const std::uint32_t t : order) {
       CompiledTask &task = task_set_.tasks[t];
-      task.offset = workload_.dags[dag].tasks[t - first].offset;
-      if (!task.data) continue;
-      std::optional<Duration> latest;
-      for (const std::uint32_t p : task.predecessors) {
-        const CompiledTask &before = task_set_.tasks[p];
-        if (before.period == task.period) latest = std::max(latest.value_or(before.offset), before.offset);
+      task.offset = stated.tasks[t - first].offset;
+      if (task.data) {
+        take_grid(task);
+      } else {
+        const Phase phase = phase_of(stated.tasks[t - first]);
+        task.clock = phase == Phase::Common ? stated.executor : next_clock_++;
+        task.has_gaps = phase == Phase::Event;
       }
-      task.offset = latest.value_or(0);
     }
   }
 
-  [[nodiscard]] bool is_released_together(std::uint32_t dag, const std::vector<std::uint32_t> &tasks) const {
-    const std::uint32_t first = task_set_.dags[dag].tasks.front();
-    std::optional<Duration> offset;
-    for (const std::uint32_t t : tasks) {
-      const Task &task = workload_.dags[dag].tasks[t - first];
-      if (task.period != task_set_.tasks[tasks.front()].period) return false;
-      if (task.activation != Activation::Timer) continue;
-      if (offset && *offset != task.offset) return false;
-      offset = task.offset;
+  // Gives a data task the grid of its predecessors.
+  void take_grid(CompiledTask &task) {
+    std::optional<Duration> latest;
+    for (const std::uint32_t p : task.predecessors) {
+      const CompiledTask &before = task_set_.tasks[p];
+      if (before.period == task.period) latest = std::max(latest.value_or(before.offset), before.offset);
     }
-    return offset.has_value();
+    const CompiledTask &one = task_set_.tasks[task.predecessors.front()];
+    const bool is_one_clock = std::all_of(task.predecessors.begin(), task.predecessors.end(),
+                                          [&](std::uint32_t p) { return task_set_.tasks[p].clock == one.clock; });
+    task.clock = is_one_clock ? one.clock : next_clock_++;
+    task.offset = is_one_clock ? latest.value_or(0) : 0;
+    task.has_gaps = is_one_clock && one.has_gaps;
+  }
+
+  // A ROS timer counts from when its node created it, and messages from another process come when that one sends them.
+  // Who calls a service or an action does so at any time.
+  static Phase phase_of(const Task &task) {
+    if (task.phase != Phase::Common || !task.callback) return task.phase;
+    const Callback::Kind kind = task.callback->kind;
+    const bool is_periodic = kind == Callback::Kind::Timer || kind == Callback::Kind::Subscription;
+    return is_periodic ? Phase::Unknown : Phase::Event;
+  }
+
+  [[nodiscard]] bool is_released_together(const std::vector<std::uint32_t> &tasks) const {
+    const CompiledTask *timer = nullptr;
+    for (const std::uint32_t t : tasks) {
+      const CompiledTask &task = task_set_.tasks[t];
+      if (task.period != task_set_.tasks[tasks.front()].period) return false;
+      if (task.data) continue;
+      if (timer != nullptr && !is_released_with(*timer, task)) return false;
+      timer = &task;
+    }
+    return timer != nullptr;
   }
 
   void form_units(std::uint32_t dag) {
@@ -383,6 +421,7 @@ class Compiler {
   TaskSet task_set_;
   Loss lost_;
   std::map<std::string, std::uint32_t> group_ids_;
+  std::uint32_t next_clock_ = 0;
 };
 
 }  // namespace

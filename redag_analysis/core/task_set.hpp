@@ -101,15 +101,24 @@ struct CompiledTask {
   std::uint32_t level = 0;         // tasks of one level do not preempt each other
   std::uint32_t group = kNoGroup;  // only groups that two or more tasks share
   bool data = false;               // released by its predecessors' completion
+  std::uint32_t clock = 0;         // what its grid counts from; see is_released_with()
+  bool has_gaps = false;           // its grid is that of events: the points are T apart, or any time more
   std::vector<std::uint32_t> predecessors;  // TaskIds
   std::vector<std::uint32_t> successors;    // TaskIds
 };
 
+/// True if job k of one is always released with job k of the other: both have one grid. Grids of different clocks have
+/// no known phase: the timers of two executors, what comes from outside, and a data task that joins such sources.
+[[nodiscard]] constexpr bool is_released_with(const CompiledTask &a, const CompiledTask &b) {
+  return a.clock == b.clock && a.period == b.period && a.offset == b.offset;
+}
+
 /// A unit is what is released as a whole: a task without edges, or tasks of one rate that edges join. A DAG with edges
-/// and one rate is one unit. Otherwise each connected part of a DAG is one, cut at *rate edges*: those into a task with
-/// a predecessor of another period or offset. The response time of a unit runs from its nominal release to the finish
+/// and one grid is one unit. Otherwise each connected part of a DAG is one, cut at *rate edges*: those into a task with
+/// a predecessor on another grid. The response time of a unit runs from its nominal release to the finish
 /// of its last task. The nominal release of a unit behind rate edges is the point of its grid, `offset` + k `period`.
-/// That grid is the timer's own, or that of the predecessor with the largest period (rate_edges.hpp).
+/// That grid is the timer's own, or that of the predecessor with the largest period (rate_edges.hpp). A data task that
+/// joins several clocks has a grid of its own, whose points are at least a period apart.
 struct Unit {
   DagId dag;
   std::vector<std::uint32_t> tasks;   // TaskIds in topological order
@@ -132,7 +141,7 @@ struct CompiledDag {
   std::vector<std::uint32_t> tasks;  // TaskIds
   std::uint32_t max_active = 0;      // 0: no bound; otherwise below the number of its tasks
   Duration deadline = 0;             // end to end; 0: none
-  bool high = false;                 // of high criticality: never degraded
+  bool high = false;                 // never degraded: of high criticality, or no job of its executor begins HI mode
 };
 
 struct TaskSet {
@@ -155,6 +164,8 @@ struct TaskSet {
   /// Some wcet_low is below its wcet: there is a HI mode, and not_analysable has no other reason. Methods that know
   /// modes (Method::knows_modes) apply.
   bool has_modes = false;
+  /// With has_modes: several executors start jobs, and HI mode of one does not concern the others.
+  bool has_separate_modes = false;
   /// Jobs wait without a worker, and not_analysable has no other reason. CompiledTask::wcet counts waits as execution,
   /// and methods that are sound then, or that look at the waits themselves (Method::knows_waits), apply.
   bool has_waits = false;

@@ -65,7 +65,13 @@ ResponseRange Exploration::of(TaskId task) const {
 
 std::optional<std::string> why_not_explore(const TaskSet &task_set) {
   if (!task_set.not_analysable.empty()) return task_set.not_analysable;
-  if (task_set.has_rate_edges()) return "edges join tasks of different periods or offsets: see the bounds for DAGs";
+  if (task_set.has_rate_edges()) return "edges join tasks that are not released together: see the bounds for DAGs";
+  const auto is_free = [&](const CompiledTask &task) {
+    return task.has_gaps || task.clock != task_set.tasks.front().clock;
+  };
+  if (std::any_of(task_set.tasks.begin(), task_set.tasks.end(), is_free)) {
+    return "nothing states when some tasks are released after others: they have no common clock";
+  }
   if (task_set.mode != sched::Preemption::None)
     return "requires jobs that run to completion, but jobs can be preempted here";
   if (task_set.policy == PolicyKind::Fifo) return "under fifo, the order of two jobs depends on when they became ready";

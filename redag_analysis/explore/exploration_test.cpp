@@ -115,6 +115,15 @@ TEST(Exploration, SaysWhenItEndsEarly) {
 TEST(Exploration, SaysWhereThereIsNothingToExplore) {
   BoundCase bound_case = one_dag(1, {timer("a", 1, 2, 10)});
   EXPECT_FALSE(why_not_explore(compiled(bound_case)));
+  for (const Phase phase : {Phase::Unknown, Phase::Event}) {
+    BoundCase free = one_dag(1, {timer("a", 1, 2, 10), timer("b", 1, 2, 10)});
+    free.workload.dags[0].tasks[1].phase = phase;
+    EXPECT_EQ(why_not_explore(compiled(free)),
+              "nothing states when some tasks are released after others: they have no common clock");
+  }
+  BoundCase event = bound_case;
+  event.workload.dags[0].tasks[0].phase = Phase::Event;
+  EXPECT_TRUE(why_not_explore(compiled(event))) << "it need not be periodic";
   bound_case.workload.policy = PolicyKind::Fifo;
   EXPECT_TRUE(why_not_explore(compiled(bound_case)));
   bound_case.workload.policy = PolicyKind::Edf;

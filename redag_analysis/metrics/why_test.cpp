@@ -277,6 +277,21 @@ TEST(Why, OfAnAndJoinTheWayFollowsTheOldestDataAndTheWaitTheLastOne) {
             "1000000 executed\n");
 }
 
+// A less urgent job keeps the worker from 5 to 39. Three jobs queue behind it, and it delays each of them.
+TEST(Why, AJobInAQueueWaitsForWhatTheFirstOneWaitsFor) {
+  Workload workload = make_workload({make_dag("a", {{.name = "fast", .period = 10}}),
+                                     make_dag("b", {{.name = "long", .period = 1000, .wcet = 34, .offset = 5}})});
+  workload.dags[0].tasks[0].overrun = Overrun::Queue;
+  workload.dags[0].tasks[0].queue_depth = 4;
+  const trace::Trace trace = simulated(testing::run_info(std::move(workload), "redag", 1), 100 * kMillisecond);
+  for (const Explanation &one : explain_all(trace)) {
+    const auto behind = static_cast<Duration>(one.job.number) - 1;
+    if (one.job.task != TaskId(0) || behind < 0 || behind > 2) continue;
+    EXPECT_EQ(time_of(one, {Cause::Blocked}), (29 - 10 * behind) * kMillisecond);
+    EXPECT_EQ(time_of(one, {Cause::OwnTask}), behind * kMillisecond) << "those before it execute";
+  }
+}
+
 TEST(Why, WithoutAMissThereAreTheJobsClosestToTheirDeadlines) {
   const trace::Trace trace =
       simulated(testing::run_info(make_workload({make_dag("d", {{"a", 10, 1}, {"b", 10, 2}})}, 1)), 50 * kMillisecond);

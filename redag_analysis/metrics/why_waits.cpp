@@ -122,9 +122,10 @@ class ClusterWaits {
     if (gate == Replay::Gate::Task) {
       return held(Cause::OwnTask, links, [&](TaskId other) { return other == job.task; });
     }
+    // Behind an earlier job that has not started, it waits for what keeps that one from starting.
     for (const LiveJob &other : replay_.jobs_of(job.task)) {
       if (other.number == job.number) break;
-      if (other.state == State::Ready) return by(Cause::OwnTask, &other);
+      if (other.state == State::Ready) return not_started(other, links);
     }
     if (gate == Replay::Gate::Dag) {
       const DagId dag = replay_.dag_of(job.task);

@@ -61,9 +61,15 @@ Own own_of(const Unit &unit, Duration volume, Duration blocking) {
 // The units that are more urgent than a unit, in each mode.
 struct Others {
   std::vector<Interferer> low;       // all of them, with C(LO)
-  std::vector<Interferer> high;      // those of high criticality, with C(HI)
+  std::vector<Interferer> high;      // those that HI mode does not stop, with C(HI)
   std::vector<std::uint32_t> units;  // of `low`
 };
+
+// True if HI mode lasts from its beginning to the end of each busy period, so that lower criticality only interferes
+// before. The executor of the unit can be idle, and so end its HI mode, while jobs of others keep the processor busy.
+bool is_stopped(const TaskSet &task_set, const Unit &unit) {
+  return !task_set.has_separate_modes && !task_set.dags[unit.dag.value].high;
+}
 
 Others others_of(const TaskSet &task_set, const std::vector<std::uint32_t> &more_urgent) {
   Others others;
@@ -72,7 +78,7 @@ Others others_of(const TaskSet &task_set, const std::vector<std::uint32_t> &more
     const Unit &unit = task_set.units[u];
     others.units.push_back(u);
     others.low.push_back(Interferer{low_volume(task_set, unit), unit.period, unit.jitter});
-    if (task_set.dags[unit.dag.value].high) others.high.push_back(Interferer{unit.volume, unit.period, unit.jitter});
+    if (!is_stopped(task_set, unit)) others.high.push_back(Interferer{unit.volume, unit.period, unit.jitter});
   }
   return others;
 }
@@ -88,8 +94,8 @@ std::vector<Term> terms_of(const TaskSet &task_set, const Unit &unit, const View
   }
   for (std::size_t i = 0; i < others.units.size(); ++i) {
     const Unit &other = task_set.units[others.units[i]];
-    const bool high = task_set.dags[other.dag.value].high;
-    const std::int64_t jobs = one_worker::jobs_in(others.low[i], high ? window : low_window, false);
+    const Duration interferes = is_stopped(task_set, other) ? low_window : window;
+    const std::int64_t jobs = one_worker::jobs_in(others.low[i], interferes, false);
     const TaskId task = other.tasks.size() == 1 ? TaskId(other.tasks.front()) : TaskId();
     terms.push_back(Term{Term::Kind::Interference, task, other.dag, jobs * other.volume, jobs});
   }
@@ -118,7 +124,7 @@ void bound_unit(const TaskSet &task_set, one_worker::Views &views, std::uint32_t
   Duration before_change = view.blocking;
   for (std::size_t i = 0; i < others.units.size(); ++i) {
     const Unit &other = task_set.units[others.units[i]];
-    if (task_set.dags[other.dag.value].high) continue;
+    if (!is_stopped(task_set, other)) continue;
     const std::int64_t jobs = one_worker::jobs_in(others.low[i], low.found->window, false);
     before_change = add(before_change, multiply(jobs, other.volume));
   }
@@ -165,7 +171,8 @@ Method amc_rtb() {
       .assumptions =
           "one worker, full preemption, static priorities, some wcet_low below its wcet, no groups, R <= T; any "
           "degrade; "
-          "DAGs of one rate as in dag_one_worker_preemptive, without jitter if of lower criticality; shared levels",
+          "DAGs of one rate as in dag_one_worker_preemptive, without jitter if of lower criticality; shared levels; of "
+          "several executors, HI mode of one is none of the others",
       .complexity = "pseudo-polynomial; O(n) per step",
       .knows_modes = true,
       .apply = apply_amc,

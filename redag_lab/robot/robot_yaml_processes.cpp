@@ -173,11 +173,28 @@ bool ProcessesReader::check_link(const Node &node, const Link &link) {
     return refuse("to", fmt::format("task '{}' has a jitter, which would follow from the link", link.to.name),
                   "remove 'jitter:' in its workload");
   }
+  const Dag &dag = dag_of(link.to);
+  for (const Task &task : dag.tasks) {
+    const bool waits = std::any_of(task.predecessors.begin(), task.predecessors.end(),
+                                   [&](std::uint32_t p) { return &dag.tasks[p] == &to; });
+    if (!waits || task.activation == Activation::Data || task.period != to.period) continue;
+    return refuse(
+        "to",
+        fmt::format("timer task '{}' of the same period waits for '{}', but nothing synchronises it with data "
+                    "of another process",
+                    task.name, link.to.name),
+        "make it a data task: 'activation: data'");
+  }
   if (from.period == to.period) return true;
   return refuse("to",
                 fmt::format("task '{}' has the period {}, and '{}', whose data release it, has {}", link.to.name,
                             format_duration(to.period), link.from.name, format_duration(from.period)),
                 fmt::format("write 'period: {}' in its workload", format_duration(from.period)));
+}
+
+const Dag &ProcessesReader::dag_of(const TaskOf &task) const {
+  const Workload &workload = *robot_.processes[task.process].workload;
+  return workload.dags[flatten(workload)[task.task.value].dag.value];
 }
 
 const Task &ProcessesReader::task_of(const TaskOf &task) const {

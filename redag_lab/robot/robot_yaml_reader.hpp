@@ -128,6 +128,7 @@ class ProcessesReader : protected ProcessorsReader {
   void read_workload_of(const Node &node, Process &process);
   bool check_link(const Node &node, const Link &link);
   [[nodiscard]] const Task &task_of(const TaskOf &task) const;
+  [[nodiscard]] const Dag &dag_of(const TaskOf &task) const;
 
   std::unordered_map<std::string, std::pair<std::size_t, TaskId>> tasks_;
 };

@@ -158,6 +158,10 @@ TEST(RobotYaml, RefusesLinksThatReleaseNothing) {
       findings(with_link("{from: a.d.t, to: b.d.u, transport: 0}", "{name: u, wcet: 1ms, period: 9ms, jitter: 1us}")),
       "cart.yaml:7:23: error: task 'b.d.u' has a jitter, which would follow from the link (remove 'jitter:' in its "
       "workload)");
+  EXPECT_EQ(findings(with_link("{from: a.d.t, to: b.d.u, transport: 0}",
+                               receiver + ", {name: z, wcet: 1ms, period: 9ms, after: u}")),
+            "cart.yaml:7:23: error: timer task 'z' of the same period waits for 'b.d.u', but nothing synchronises it "
+            "with data of another process (make it a data task: 'activation: data')");
   EXPECT_EQ(findings(with_link("{from: a.d.t, to: b.d.u, transport: 0}\n"
                                "  - {from: a.d.s, to: b.d.u, transport: 0}",
                                receiver)),

@@ -39,6 +39,7 @@ class SimulatedProcess {
     Time release = 0;
     Time origin = 0;  // the release behind its data, in whatever process
     Duration left = 0;
+    Duration until_high = 0;  // what it executes before HI mode begins; 0: it begins none
     int priority = 0;
     std::uint64_t since = 0;  // when it came to this priority, for SCHED_FIFO's order of equals
     bool runs = false;
@@ -60,7 +61,8 @@ class SimulatedProcess {
     due_.clear();
   }
 
-  // Ends the jobs that are done. Calls `finished` for each.
+  // Ends the jobs that are done, and then begins HI mode for those that execute for longer than C(LO). Calls `finished`
+  // for each that ends.
   template <class Finished>
   void complete(Time now, Finished finished) {
     for (auto job = jobs_.begin(); job != jobs_.end();) {
@@ -72,6 +74,17 @@ class SimulatedProcess {
       scheduler_.complete(JobSlot(job->first), now, sched::Outcome::Finished);
       job = jobs_.erase(job);
     }
+    for (auto &[slot, job] : jobs_) {
+      if (job.until_high != kReached) continue;
+      job.until_high = 0;
+      scheduler_.exceed(JobSlot(slot), sched::Limit::WcetLow, now);
+      ++high_modes_;
+    }
+  }
+
+  static void run(Job &job) {
+    job.left -= kTick;
+    if (job.until_high > 0) job.until_high = job.until_high > kTick ? job.until_high - kTick : kReached;
   }
 
   void dispatch(Time now, Rng &rng, std::uint64_t &sequence) {
@@ -84,6 +97,7 @@ class SimulatedProcess {
                   .release = dispatch.release,
                   .origin = dispatch.origin,
                   .left = is_long ? wcet : kTick,
+                  .until_high = tasks_[dispatch.task.value].task->wcet_low,
                   .since = ++sequence};
       }
       const int priority = band_.of_level(dispatch.level);
@@ -94,8 +108,11 @@ class SimulatedProcess {
 
   [[nodiscard]] std::map<std::uint32_t, Job> &jobs() { return jobs_; }
   [[nodiscard]] const std::vector<TaskRef> &tasks() const { return tasks_; }
+  [[nodiscard]] std::uint64_t high_modes() const { return high_modes_; }
 
  private:
+  static constexpr Duration kReached = -1;
+
   static sched::Config config(const Workload &workload, const runtime::PriorityBand &band, std::uint32_t workers,
                               Ties ties) {
     sched::Config config = sched::config_of(workload);
@@ -110,6 +127,7 @@ class SimulatedProcess {
   runtime::PriorityBand band_;
   sched::PriorityScheduler scheduler_;
   std::map<std::uint32_t, Job> jobs_;
+  std::uint64_t high_modes_ = 0;
   std::vector<std::pair<TaskId, Time>> due_;  // releases that the process has not learned of
   Job releasing_;                             // its thread for releases, while there are some
 };
@@ -152,7 +170,7 @@ void run_kernel(std::deque<SimulatedProcess> &processes, std::size_t cpus) {
   const std::vector<SimulatedProcess::Job *> ready = in_order(processes);
   for (std::size_t i = 0; i < ready.size(); ++i) {
     ready[i]->runs = i < cpus;
-    if (ready[i]->runs) ready[i]->left -= kTick;
+    if (ready[i]->runs) SimulatedProcess::run(*ready[i]);
   }
 }
 
@@ -182,6 +200,7 @@ Workload random_process(Rng &rng, double most_load, double groups) {
 struct Observed {
   std::uint64_t jobs = 0;
   std::uint64_t crossed = 0;  // of these, jobs whose data came from another process
+  std::uint64_t high_modes = 0;
   std::string violation;
 };
 
@@ -216,16 +235,21 @@ Observed observe(const Robot &robot, const Plan &plan, const analysis::Report &r
     const Ties ties = testing::chance(rng, 0.5) ? Ties::Share : Ties::Fixed;
     processes.emplace_back(workload, band, workers, ties);
     of_releases.push_back(std::max(1, band.of_releases() - lowered));
-    std::vector<Duration> offsets;  // those of a DAG stay aligned
+    const auto below = [&](Duration period) {
+      return testing::between(rng, 0, static_cast<std::uint32_t>(period / kTick) - 1) * kTick;
+    };
+    std::vector<Duration> offsets;  // those of a DAG stay aligned, but for tasks with a clock of their own
     for (const Dag &dag : workload.dags) {
       Duration period = kTick;
       for (const Task &task : dag.tasks) period = std::max(period, task.period);
-      offsets.push_back(testing::between(rng, 0, static_cast<std::uint32_t>(period / kTick)) * kTick);
+      offsets.push_back(below(period));
       longest = std::max(longest, period);
     }
     for (const TaskRef &ref : processes.back().tasks()) {
       if (ref.task->activation != Activation::Timer || is_linked(robot, p, ref.id)) continue;
-      timers.push_back(Timer{p, ref.id, ref.task->offset + offsets[ref.dag.value], ref.task->period});
+      const bool is_free = ref.task->phase != Phase::Common;
+      const Time first = is_free ? below(ref.task->period) : ref.task->offset + offsets[ref.dag.value];
+      timers.push_back(Timer{p, ref.id, first, ref.task->period});
     }
     first_task.push_back(tasks);
     tasks += workload.task_count();
@@ -281,6 +305,7 @@ Observed observe(const Robot &robot, const Plan &plan, const analysis::Report &r
     run_releases(processes, cpus, now, rng, sequence);
     run_kernel(processes, cpus);
   }
+  for (const SimulatedProcess &process : processes) observed.high_modes += process.high_modes();
   return observed;
 }
 
@@ -301,10 +326,12 @@ Robot random_robot(Rng &rng, std::vector<int> cpus, double most_load = 0.5, doub
 // Data have to arrive within a period.
 constexpr double kLoadWithLinks = 0.2;
 
-// Adds a process whose DAGs receive data of the others, each from a task of a DAG with one timer.
+// Adds a process whose DAGs receive data of the others, each from a task of a DAG with one timer. Some join them with a
+// timer of the process.
 void add_receiver(Rng &rng, Robot &robot) {
   std::vector<testing::TestTask> tasks;
   std::vector<Dag> dags;
+  std::uint32_t next_task = 0;
   const std::size_t receiver = robot.processes.size();
   for (std::size_t p = 0; p < receiver; ++p) {
     const Workload &workload = *robot.processes[p].workload;
@@ -315,12 +342,17 @@ void add_receiver(Rng &rng, Robot &robot) {
       if (timers != 1 || dags.size() == 2 || testing::chance(rng, 0.5)) continue;
       const Duration period = ref.task->period;
       const auto wcet = [&] { return testing::between(rng, 1, 2) * kTick; };
-      dags.push_back(testing::tick_dag(fmt::format("d{}", dags.size()),
-                                       {{.name = "in", .period = period, .wcet = wcet(), .deadline = 4 * period},
-                                        {.name = "out", .wcet = wcet(), .after = {0}}}));
-      const auto first = static_cast<std::uint32_t>(2 * (dags.size() - 1));
+      std::vector<testing::TestTask> members = {
+          {.name = "in", .period = period, .wcet = wcet(), .deadline = 4 * period},
+          {.name = "out", .wcet = wcet(), .after = {0}}};
+      if (testing::chance(rng, 0.5)) {
+        members.push_back({.name = "own", .period = period, .wcet = kTick, .deadline = 4 * period});
+        members[1].after = {0, 2};
+      }
+      dags.push_back(testing::tick_dag(fmt::format("d{}", dags.size()), members));
       robot.links.push_back(
-          Link{{p, ref.id, "from"}, {receiver, TaskId(first), "to"}, testing::between(rng, 0, 3) * kTick, {}});
+          Link{{p, ref.id, "from"}, {receiver, TaskId(next_task), "to"}, testing::between(rng, 0, 3) * kTick, {}});
+      next_task += static_cast<std::uint32_t>(members.size());
     }
   }
   if (dags.empty()) return;
@@ -444,7 +476,7 @@ TEST(RobotUnionBounds, HoldForDataOfOtherProcesses) {
   }
   RecordProperty("robots", static_cast<int>(robots));
   RecordProperty("crossed", static_cast<int>(crossed));
-  EXPECT_GT(robots, count / 15);
+  EXPECT_GT(robots, count / 20);
   EXPECT_GT(crossed, robots * 20);
 }
 
@@ -462,6 +494,66 @@ TEST(RobotUnionBounds, BreakWhereDataAreTakenToBeThere) {
     if (!observe(robot, analysed_without.plan, analysed_without.report, 2, seed).violation.empty()) ++violations;
   }
   EXPECT_GT(violations, 5U);
+}
+
+// A robot in which jobs of some processes begin HI mode.
+Robot with_modes(Rng &rng) {
+  Robot robot = random_robot(rng, {0}, 0.8, 0);
+  for (Process &process : robot.processes) {
+    if (testing::chance(rng, 0.4)) continue;
+    for (Dag &dag : process.workload->dags) {
+      if (testing::chance(rng, 0.5)) {
+        dag.degrade.kind = testing::chance(rng, 0.5) ? Degrade::Kind::Stop : Degrade::Kind::Skip;
+        continue;
+      }
+      dag.criticality = Criticality::High;
+      for (Task &task : dag.tasks) {
+        const auto wcet = static_cast<std::uint32_t>(task.wcet / kTick);
+        if (wcet > 1) task.wcet_low = testing::between(rng, 1, wcet - 1) * kTick;
+      }
+    }
+  }
+  return robot;
+}
+
+// HI mode of one process stops no work of the others, and ends when that process is idle.
+TEST(RobotUnionBounds, HoldWhereProcessesHaveHiModesOfTheirOwn) {
+  std::uint64_t bounded = 0;
+  std::uint64_t high_modes = 0;
+  const std::uint64_t count = testing::how_many(400);
+  for (std::uint64_t seed = 1; seed <= count; ++seed) {
+    Rng rng(seed);
+    const Robot robot = with_modes(rng);
+    const auto [plan, report] = analysed(robot, 90);
+    bounded += std::any_of(report.tasks.begin(), report.tasks.end(), [](const auto &each) { return each.response; });
+    for (std::uint64_t run = 0; run < 3; ++run) {
+      const Observed observed = observe(robot, plan, report, 1, seed * 1000 + run);
+      high_modes += observed.high_modes;
+      ASSERT_EQ(observed.violation, "") << "seed " << seed << ", run " << run;
+    }
+  }
+  EXPECT_GT(bounded, count / 4);
+  EXPECT_GT(high_modes, 3 * count);
+}
+
+// The process with the urgent work never learns of HI mode.
+TEST(RobotUnionBounds, CountAllWorkOfProcessesThatDoNotLearnOfHiMode) {
+  using testing::tick_dag;
+  Robot robot;
+  robot.cpu_sets = {CpuSet{"", {0}}};
+  Dag high = tick_dag("hi", {{.name = "s", .period = 20 * kTick, .wcet = 5 * kTick}});
+  high.criticality = Criticality::High;
+  high.tasks[0].wcet_low = kTick;
+  const Dag other = tick_dag("lo", {{.name = "s", .period = 5 * kTick, .wcet = 3 * kTick}});
+  for (const Dag &dag : {high, other}) {
+    Process &process = robot.processes.emplace_back();
+    process.name = dag.name;
+    process.workload = testing::make_workload({dag}, 1, PreemptionMode::Os);
+  }
+  const analysis::Report report = analysed(robot, 90).report;
+  // 5 of its own and three jobs of 3; the other process is bounded in every mode, too.
+  EXPECT_EQ(report.tasks[0].response, 14 * kTick);
+  EXPECT_EQ(report.tasks[1].response, 3 * kTick);
 }
 
 // The same comparison, where less urgent jobs of other processes delay releases: it notices.

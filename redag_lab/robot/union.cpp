@@ -43,6 +43,7 @@ class Union {
     }
     if (!mistakes_.empty()) return tl::unexpected<Diagnostics>(std::move(mistakes_));
     set_platform();
+    set_phases();
     if (order_.is_merged() || has_above_ || robot_.by_bounds) fix_priorities();
     Diagnostics found = validate(workload_, options);
     if (has_errors(found)) return tl::unexpected<Diagnostics>(std::move(found));
@@ -73,12 +74,52 @@ class Union {
       Dag &dag = workload_.dags.emplace_back(original);
       dag.name = joined(process.name, dag.name);
       dag.cluster = {};
+      dag.executor = next_executor_;
       for (Task &task : dag.tasks) {
         if (!task.group.empty()) task.group = joined(process.name, task.group);
       }
       set_of_dag_.push_back(process.cpu_set);
     }
     levels_.insert(levels_.end(), order_.of_task[p].begin(), order_.of_task[p].end());
+    ++next_executor_;
+  }
+
+  // Nothing synchronises the timers of a process with data of others, or with threads that execute a task.
+  void set_phases() {
+    std::vector<Task *> tasks;
+    for (Dag &dag : workload_.dags) {
+      for (Task &task : dag.tasks) tasks.push_back(&task);
+    }
+    const std::vector<TaskRef> refs = flatten(workload_);
+    for (std::size_t p = 0; p < robot_.processes.size(); ++p) {
+      const std::size_t count = robot_.processes[p].workload ? robot_.processes[p].workload->task_count() : 0;
+      for (std::size_t t = 0; t < count; ++t) {
+        Task &task = *tasks[first_task_[p] + t];
+        const bool is_source = task.activation == Activation::Timer && task.predecessors.empty();
+        if (is_source && task.phase == Phase::Common && is_of_threads(robot_, p, TaskId(t)))
+          set_free(task, Phase::Unknown);
+      }
+    }
+    for (const Link &link : robot_.links)
+      set_free(*tasks[first_task_[link.to.process] + link.to.task.value], Phase::Unknown);
+    // Data of events come by events, over as many links as there are.
+    for (bool changed = true; changed;) {
+      changed = false;
+      for (const Link &link : robot_.links) {
+        Task &to = *tasks[first_task_[link.to.process] + link.to.task.value];
+        const Dag &dag = workload_.dags[refs[first_task_[link.from.process] + link.from.task.value].dag.value];
+        const bool has_events = std::any_of(dag.tasks.begin(), dag.tasks.end(),
+                                            [](const Task &task) { return task.phase == Phase::Event; });
+        if (!has_events || to.phase == Phase::Event) continue;
+        to.phase = Phase::Event;
+        changed = true;
+      }
+    }
+  }
+
+  static void set_free(Task &task, Phase phase) {
+    task.phase = phase;
+    task.offset = 0;
   }
 
   // Within its process, an executor decides which jobs the kernel gets to choose from.
@@ -136,6 +177,7 @@ class Union {
     const Threads &threads = robot_.threads[t];
     if (!threads.level) return;
     if (threads.level->kind == Level::Kind::Task) {
+      check_alone(threads);
       const Process &process = robot_.processes[threads.level->task.process];
       if (threads.cpus.empty() || threads.cpus == robot_.cpu_sets[process.cpu_set].cpus) return;
       refuse(threads.place,
@@ -157,6 +199,26 @@ class Union {
     task.wcet = threads.wcet;
     task.period = task.deadline = threads.period;
     add_interference(t, *set, task, order_.of_threads[t] ? static_cast<int>(*order_.of_threads[t]) : kAbove);
+  }
+
+  // Only an executor keeps what a task shares with others.
+  void check_alone(const Threads &threads) {
+    const TaskOf &of = threads.level->task;
+    const Workload &workload = *robot_.processes[of.process].workload;
+    const TaskRef ref = flatten(workload)[of.task.value];
+    const Dag &dag = workload.dags[ref.dag.value];
+    const bool has_successor = std::any_of(dag.tasks.begin(), dag.tasks.end(), [&](const Task &task) {
+      return std::find(task.predecessors.begin(), task.predecessors.end(), ref.index) != task.predecessors.end();
+    });
+    const char *shared = !ref.task->group.empty()                           ? "a group"
+                         : dag.max_active > 0                               ? "a max_active"
+                         : !ref.task->predecessors.empty() || has_successor ? "edges"
+                                                                            : nullptr;
+    if (shared == nullptr) return;
+    refuse(threads.place,
+           fmt::format("threads '{}' execute task '{}', which has {}: only an executor would keep to that",
+                       threads.name, of.name, shared),
+           "give the threads a task without that, in a DAG of its own");
   }
 
   // The bound for one of them assumes that it has a processor whenever the kernel lets it run.
@@ -187,6 +249,7 @@ class Union {
     Dag &dag = workload_.dags.emplace_back();
     dag.name = joined(kThreads, threads.name);
     dag.is_foreign = true;
+    dag.executor = next_executor_++;
     ++starters_;
     for (std::uint32_t i = 0; i < threads.count; ++i) {
       task.name = threads.count == 1 ? "run" : fmt::format("run_{}", i + 1);
@@ -256,8 +319,9 @@ class Union {
   std::vector<std::size_t> first_task_;  // by process: the first of its tasks in the union
   std::vector<std::optional<std::size_t>> first_of_threads_;
   std::map<std::size_t, std::size_t> reserved_;  // by CPU set: threads with reservations
-  std::size_t starters_ = 0;                     // what starts jobs without knowing of the others
-  bool has_above_ = false;                       // some task is above all levels of the order
+  std::uint32_t next_executor_ = 0;
+  std::size_t starters_ = 0;  // what starts jobs without knowing of the others
+  bool has_above_ = false;    // some task is above all levels of the order
 };
 
 }  // namespace

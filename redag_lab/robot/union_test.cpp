@@ -10,9 +10,12 @@
 #include <algorithm>
 #include <string>
 
+#include "redag/model/modes.hpp"
 #include "redag/sched/policy.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
 #include "redag_lab/robot/order.hpp"
 #include "redag_lab/search/analysed.hpp"
+#include "redag_testing/bound_property.hpp"
 #include "redag_testing/builders.hpp"
 #include "redag_testing/random_workloads.hpp"
 
@@ -98,6 +101,72 @@ TEST(RobotUnion, DataOfADagAreBehindTheReleaseOfItsSource) {
   EXPECT_GE(united->workload.dags[1].tasks[0].jitter, (2 + 3) * kMillisecond);
 }
 
+// The sender's timer, and so the data that cross, have no known phase to the receiver's.
+TEST(RobotUnion, NothingSynchronisesDataOfAnotherProcessWithATimer) {
+  const Workload receiver = make_workload(
+      {make_dag("d", {{.name = "x", .period = 10}, {.name = "y", .period = 10}, {.name = "j", .after = {0, 1}}})}, 2,
+      PreemptionMode::Os);
+  Robot robot = robot_of({one_task(10, 1), receiver});
+  robot.links = {{{0, TaskId(0), "p0.d.t"}, {1, TaskId(0), "p1.d.x"}, kMillisecond, {}}};
+  const auto end_to_end = [&] {
+    const Result<LoadedWorkload> united = union_of(robot, kLevels);
+    EXPECT_TRUE(united) << to_string(united.error());
+    return analysis::analyze(testing::compiled(united->workload)).dags[1].response;
+  };
+  // y at 0 ends at 1. s at 7.9 ends at 8.9, x is seen at 9.9 and ends at 10.9, and j ends at 11.9 with data of 0.
+  ASSERT_TRUE(end_to_end());
+  EXPECT_GE(*end_to_end(), 11'900'000);
+  // Data of an event come whenever it does; the timer's data wait for them, but are replaced by its next ones.
+  robot.processes[0].workload->dags[0].tasks[0].phase = Phase::Event;
+  EXPECT_EQ(union_of(robot, kLevels)->workload.dags[1].tasks[0].phase, Phase::Event);
+  EXPECT_TRUE(end_to_end());
+  robot.processes[1].workload->dags[0].tasks[1].phase = Phase::Event;
+  EXPECT_FALSE(end_to_end());
+}
+
+TEST(RobotUnion, TasksOfThreadsHaveClocksOfTheirOwn) {
+  Robot robot = robot_of({make_workload({make_dag("d", {{.name = "a", .period = 5}, {.name = "b", .period = 5}})}, 2,
+                                        PreemptionMode::Os)});
+  robot.threads.push_back(threads_at(Level::Kind::Task, 0, 0));
+  robot.threads[0].level->task.task = TaskId(1);
+  const Result<LoadedWorkload> united = union_of(robot, kLevels);
+  ASSERT_TRUE(united) << to_string(united.error());
+  EXPECT_EQ(united->workload.dags[0].tasks[0].phase, Phase::Common);
+  EXPECT_EQ(united->workload.dags[0].tasks[1].phase, Phase::Unknown);
+}
+
+TEST(RobotUnion, ThreadsExecuteNoTaskThatSharesWhatAnExecutorKeeps) {
+  const auto refusal_of = [](Dag dag) {
+    Robot robot = robot_of({make_workload({std::move(dag)}, 2, PreemptionMode::Os)});
+    robot.threads.push_back(threads_at(Level::Kind::Task, 0, 0));
+    robot.threads[0].level->task = {0, TaskId(0), "p0.d.a"};
+    return refusal(robot);
+  };
+  EXPECT_EQ(refusal_of(make_dag("d", {{.name = "a", .period = 5}})), "accepted");
+  EXPECT_EQ(refusal_of(make_dag("d", {{.name = "a", .period = 5, .group = "g"}})),
+            "cart.yaml:30:5: error: threads 'x' execute task 'p0.d.a', which has a group: only an executor would keep "
+            "to that (give the threads a task without that, in a DAG of its own)");
+  EXPECT_NE(refusal_of(make_dag("d", {{.name = "a", .period = 5}}, 1)).find("has a max_active"), std::string::npos);
+  EXPECT_NE(refusal_of(make_dag("d", {{.name = "a", .period = 5}, {.name = "b", .after = {0}}})).find("has edges"),
+            std::string::npos);
+}
+
+TEST(RobotUnion, EachProcessHasAClockAndAHiModeOfItsOwn) {
+  Workload high = one_task(10, 2);
+  high.dags[0].criticality = Criticality::High;
+  high.dags[0].tasks[0].wcet_low = 1;
+  Robot robot = robot_of({high, one_task(10)});
+  const Workload united = union_of(robot, kLevels)->workload;
+  EXPECT_NE(united.dags[0].executor, united.dags[1].executor);
+  EXPECT_TRUE(has_separate_modes(united));
+  EXPECT_FALSE(refuse_separate_modes(united, "the simulator"));
+  robot.processes.pop_back();
+  robot.threads.push_back(threads_at(Level::Kind::Above, kMillisecond, 50 * kMillisecond));
+  EXPECT_TRUE(has_separate_modes(union_of(robot, kLevels)->workload)) << "threads know of no mode";
+  robot.threads.clear();
+  EXPECT_TRUE(refuse_separate_modes(union_of(robot, kLevels)->workload, "the simulator"));
+}
+
 TEST(RobotUnion, RefusesLinksWithoutABound) {
   EXPECT_EQ(refusal(linked(8)),
             "cart.yaml:40:5: error: data of 'p0.d.t' can arrive 12ms after the release behind them, which is more than "
@@ -132,6 +201,7 @@ RC_GTEST_PROP(RobotUnion, IsTheWorkloadWrittenByHand, ()) {
     process.states_workers = true;
     for (Dag &dag : workload.dags) {
       dag.name = process.name + "/" + dag.name;
+      dag.executor = p;
       for (Task &task : dag.tasks) {
         if (!task.group.empty()) task.group = process.name + "/" + task.group;
       }

@@ -12,6 +12,7 @@
 #include <span>
 
 #include "redag/model/clusters.hpp"
+#include "redag/model/modes.hpp"
 #include "redag/runtime/threads.hpp"
 #include "redag/sched/cluster_config.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
@@ -317,9 +318,11 @@ Result<Session> run_session(const Workload &workload, const Variant &variant, co
   const auto begin = std::chrono::steady_clock::now();
   const Result<Workload> configured = configure(workload, variant);
   if (!configured) return tl::unexpected<Diagnostics>(configured.error());
-  Result<Session> session = options.driver == trace::Driver::Simulator
-                                ? simulate(*configured, variant, options, progress)
-                                : run_on_threads(*configured, variant, options, progress);
+  const bool is_simulated = options.driver == trace::Driver::Simulator;
+  const Result<void> one_mode = refuse_separate_modes(*configured, is_simulated ? "the simulator" : "an executor");
+  if (!one_mode) return tl::unexpected<Diagnostics>(one_mode.error());
+  Result<Session> session = is_simulated ? simulate(*configured, variant, options, progress)
+                                         : run_on_threads(*configured, variant, options, progress);
   if (!session) return session;
   session->elapsed = since(begin);
   return session;

@@ -44,6 +44,19 @@ void set_period(Task &task, Duration period) {
   task.period = period;
 }
 
+// Data tasks have the largest period of their predecessors.
+void inherit_changed_periods(Dag &dag) {
+  const std::vector<std::uint32_t> ranks = topological_ranks(dag);
+  std::vector<std::uint32_t> order(ranks.size());
+  for (std::uint32_t t = 0; t < ranks.size(); ++t) order[ranks[t]] = t;
+  for (const std::uint32_t t : order) {
+    if (dag.tasks[t].activation != Activation::Data) continue;
+    Duration largest = 0;
+    for (const std::uint32_t p : dag.tasks[t].predecessors) largest = std::max(largest, dag.tasks[p].period);
+    set_period(dag.tasks[t], largest);
+  }
+}
+
 // Returns the tasks by TaskId.
 std::vector<Task *> tasks_of(Workload &workload) {
   std::vector<Task *> tasks;
@@ -76,6 +89,9 @@ Workload turned(const Workload &workload, const Knob &knob, std::int64_t positio
       case Knob::Kind::Period: set_period(task, -position); break;
       case Knob::Kind::Rates: set_period(task, scaled_down(task.period, kFactorUnit, position)); break;
     }
+  }
+  if (knob.kind == Knob::Kind::Period || knob.kind == Knob::Kind::Rates) {
+    for (Dag &dag : result.dags) inherit_changed_periods(dag);
   }
   return result;
 }

@@ -34,9 +34,9 @@ struct Knob {
 [[nodiscard]] std::int64_t nominal_position(const Workload &workload, const Knob &knob);
 
 /// Returns the workload with the knob turned. With a wcet, the bcet, the execution-time model and the longest region
-/// change in proportion. With a period, deadlines equal to it change. Jitter, offsets, budgets, explicit deadlines and
-/// end-to-end deadlines stay. The result need not be valid; compile() reports it. Requires a position > 0 (Period: < 0)
-/// and a valid workload.
+/// change in proportion. With a period, deadlines equal to it change, and the periods that data tasks inherit. Jitter,
+/// offsets, budgets, explicit deadlines and end-to-end deadlines stay. The result need not be valid; compile() reports
+/// it. Requires a position > 0 (Period: < 0) and a valid workload.
 [[nodiscard]] Workload turned(const Workload &workload, const Knob &knob, std::int64_t position);
 
 /// Returns the load at `position` relative to the workload's own, above 1 where it grew. For display.

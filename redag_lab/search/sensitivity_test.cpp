@@ -126,6 +126,21 @@ TEST(Sensitivity, AcceptanceThatComesBackIsReported) {
   EXPECT_LE(*found->again, 600);
 }
 
+// A data task joins two rates, and has the larger period: that of b until it is below a's.
+TEST(Sensitivity, DataTasksFollowThePeriodOfTheSlowerPredecessor) {
+  const Workload workload = testing::make_workload(
+      {testing::make_dag("d",
+                         {{.name = "a", .period = 10}, {.name = "b", .period = 40}, {.name = "f", .after = {0, 1}}})},
+      1, PreemptionMode::Os);
+  const Workload faster = turned(workload, {Kind::Period, {1}}, -5 * kMillisecond);
+  EXPECT_EQ(to_string(validate(faster)), "");
+  EXPECT_EQ(faster.dags[0].tasks[2].period, 10 * kMillisecond);
+  EXPECT_EQ(faster.dags[0].tasks[2].deadline, 10 * kMillisecond);
+  const Margin found = margin(workload, {Kind::Period, {1}});
+  ASSERT_TRUE(found.position);
+  EXPECT_GE(*found.position, -10 * kMillisecond) << found.obstacle;
+}
+
 TEST(Sensitivity, StopsWhenAsked) {
   const Workload workload = independent({{kMillisecond, 4 * kMillisecond}});
   SensitivityOptions options;

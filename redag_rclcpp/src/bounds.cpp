@@ -114,11 +114,6 @@ void Bounds::analyse(const Workload &workload, const redag::sched::Config &confi
     absent_ = task_set->not_analysable;
     return;
   }
-  if (task_set->has_rate_edges()) {
-    absent_ =
-        "edges join tasks of different periods, and their waiting times depend on when the nodes created their timers";
-    return;
-  }
   const redag::analysis::Report report = redag::analysis::analyze(*task_set);
   std::vector<std::string> without;
   for (const redag::TaskRef &ref : redag::flatten(workload)) {

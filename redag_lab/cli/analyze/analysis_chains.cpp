@@ -30,7 +30,8 @@ std::optional<Duration> let_reaction_of(const lab::Analysed &analysed, const std
   std::vector<analysis::LetTask> chain;
   for (const TaskId id : tasks) {
     const analysis::CompiledTask &task = analysed.task_set.tasks[id.value];
-    if (task.data) return std::nullopt;
+    const analysis::CompiledTask &first = analysed.task_set.tasks[tasks.front().value];
+    if (task.data || task.has_gaps || task.clock != first.clock) return std::nullopt;
     chain.push_back({task.period, task.offset, task.deadline});
   }
   return analysis::let_reaction(chain);

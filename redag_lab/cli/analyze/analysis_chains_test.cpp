@@ -48,6 +48,20 @@ TEST(AnalysisChains, OfTimersLogicalExecutionTimeIsExact) {
   EXPECT_EQ(row->let, 50 * kMillisecond);
 }
 
+TEST(AnalysisChains, WithoutACommonClockThereIsNoLogicalExecutionTime) {
+  const auto let = [](Workload workload) {
+    return find_chain(lab::analyse(workload, analysis::platform_of(workload)).value(), "a.s,b.y")->let;
+  };
+  Workload workload = testing::make_workload({testing::make_dag("a", {{"s", 10}}), testing::make_dag("b", {{"y", 10}})},
+                                             1, PreemptionMode::Os);
+  EXPECT_EQ(let(workload), 30 * kMillisecond);
+  Workload processes = workload;
+  processes.dags[1].executor = 1;
+  EXPECT_FALSE(let(processes)) << "up to just under 40 ms";
+  workload.dags[1].tasks[0].phase = Phase::Event;
+  EXPECT_FALSE(let(workload));
+}
+
 TEST(AnalysisChains, SaysWhatIsWrongWithAName) {
   const lab::Analysed analysed = sensor_and_pipeline();
   for (const char *chain : {"", "sensor.read,", "sensor.raed", "pipeline"}) {

@@ -11,6 +11,7 @@
 #include "redag/base/provenance.hpp"
 #include "redag/base/text.hpp"
 #include "redag/model/clusters.hpp"
+#include "redag/model/modes.hpp"
 #include "redag/model/validate.hpp"
 #include "redag/model/workload_yaml.hpp"
 #include "redag/model/workload_yaml_edit.hpp"
@@ -180,7 +181,8 @@ std::optional<Workload> load_without_clusters(const RunArguments &arguments, con
                                               std::string *source) {
   std::optional<Workload> workload = load_configured(arguments, console, {.waits = true}, command, source);
   if (!workload) return std::nullopt;
-  if (const Result<void> one = refuse_clusters(*workload, command); !one) {
+  for (const Result<void> &one : {refuse_clusters(*workload, command), refuse_separate_modes(*workload, command)}) {
+    if (one) continue;
     console.note(one.error());
     return std::nullopt;
   }
