@@ -10,7 +10,6 @@
 #include <cstring>
 #include <utility>
 
-#include "redag/model/text_file.hpp"
 #include "redag/trace/output_file.hpp"
 
 namespace redag::cli {
@@ -32,10 +31,6 @@ Result<std::string> read_standard_input() {
 }
 
 }  // namespace
-
-Result<std::string> read_input_text(const std::string &path, const char *what) {
-  return path == "-" ? read_standard_input() : read_text_file(path, what, kMaxWorkloadBytes);
-}
 
 Result<robot::Input> load_workload_or_robot(const std::string &path, LoadOptions options) {
   if (path != "-") return robot::load_input(path, options);
