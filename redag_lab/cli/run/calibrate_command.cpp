@@ -30,7 +30,7 @@ struct CalibrateOptions {
   std::string out = "overheads.yaml";
 };
 
-Json to_json(const std::optional<Overheads> &overheads) {
+Json overheads_json(const std::optional<Overheads> &overheads) {
   if (!overheads) return nullptr;
   Overheads copy = *overheads;
   Json parts = Json::object();
@@ -40,7 +40,7 @@ Json to_json(const std::optional<Overheads> &overheads) {
   return parts;
 }
 
-Json to_json(const Calibration &calibration) {
+Json calibration_json(const Calibration &calibration) {
   Json rows = Json::array();
   for (const Measured &row : calibration.measured) {
     rows.push_back(Json{{"what", row.what},
@@ -58,7 +58,8 @@ Json to_json(const Calibration &calibration) {
               {"load", calibration.load},
               {"rights", calibration.rights},
               {"processors", calibration.processors},
-              {"overheads", {{"realtime", to_json(calibration.realtime)}, {"normal", to_json(calibration.normal)}}},
+              {"overheads",
+               {{"realtime", overheads_json(calibration.realtime)}, {"normal", overheads_json(calibration.normal)}}},
               {"measured", std::move(rows)}};
 }
 
@@ -124,16 +125,21 @@ int calibrate(const CalibrateOptions &options, Console &console) {
   calibration.host = now.host;
   calibration.kernel = now.kernel;
   calibration.version = now.version;
-  if (!calibration.complete) console.warn("interrupted: the calibration is incomplete");
   if (!calibration.realtime) {
     console.warn(
         "this process may not use SCHED_FIFO: only ordinary threads were measured, as preemption 'cooperative' and "
         "'none' use them");
   }
   if (options.json) {
-    console.print(to_text(to_json(calibration)));
+    console.print(to_text(calibration_json(calibration)));
   } else {
     console.say(describe(calibration, console.out_traits()));
+  }
+  if (!calibration.complete) {
+    console.error(
+        fmt::format("interrupted: {} is not written, as longer measurements can find larger values", options.out),
+        "let it finish, or choose a shorter --duration");
+    return kExitBad;
   }
   if (const Result<void> written = write_text(options.out, to_yaml(calibration)); !written) {
     console.note(written.error());
