@@ -25,7 +25,7 @@ using experiment::kNoLevel;
 using experiment::Median;
 using experiment::Metric;
 
-constexpr std::size_t kMostRows = 60;  // combinations; more are only in the file
+constexpr std::size_t kMostRowsShown = 60;  // combinations; more are only in the file
 
 Median total(const Factorial &factorial, const FactorialResults &results, const FactorialRow &row, Metric metric) {
   return *over_runs(factorial, results, row, row.runs().front().dags.size() - 1, metric);
@@ -164,9 +164,9 @@ std::string describe(const Factorial &factorial, const FactorialResults &results
     text += (text.empty() ? "" : "\n") + tinted(words, Tint::Strong, traits.colour) + "\n";
   };
   if (results.done > 0) {
-    if (results.rows.size() <= kMostRows) {
+    if (results.rows.size() <= kMostRowsShown) {
       heading(
-          "Missed deadlines: late, skipped or aborted jobs, of all releases (medians with\nconfidence intervals)\n"
+          "Missed deadlines: late, skipped or aborted jobs, of all releases (medians with confidence intervals)\n"
           "max lateness: of all runs");
       text += combination_table(factorial, results, traits);
     } else {

@@ -20,11 +20,11 @@ std::string range_text(const lab::Spread &miss) {
   return low == high ? std::string() : fmt::format("{} to {}", low, high);
 }
 
-Json to_json(const lab::Spread &spread) {
+Json spread_json(const lab::Spread &spread) {
   return Json{{"median", spread.median}, {"min", spread.min}, {"max", spread.max}};
 }
 
-Json to_json(const metrics::Distribution &d) {
+Json distribution_json(const metrics::Distribution &d) {
   return Json{{"count", d.count}, {"mean_ns", d.mean}, {"min_ns", d.min}, {"p50_ns", d.p50},
               {"p90_ns", d.p90},  {"p95_ns", d.p95},   {"p99_ns", d.p99}, {"max_ns", d.max}};
 }
@@ -34,23 +34,23 @@ Json counts_json(const metrics::JobCounts &jobs) {
               {"skipped", jobs.skipped},   {"aborted", jobs.aborted},   {"missed", jobs.missed()}};
 }
 
-Json to_json(const metrics::DagSummary &seen, bool is_dag) {
+Json dag_json(const metrics::DagSummary &seen, bool is_dag) {
   Json json = counts_json(seen.jobs);
   json["miss_ratio"] = seen.jobs.miss_ratio();
   json["miss_ratio_with_lost"] = seen.jobs.miss_ratio_with_lost();
   if (!is_dag) return json;
   json["end_to_end_late"] = seen.end_to_end.late;
-  json["end_to_end"] = to_json(seen.end_to_end.response);
+  json["end_to_end"] = distribution_json(seen.end_to_end.response);
   return json;
 }
 
-Json optional_spread(const std::optional<lab::Spread> &spread) { return spread ? to_json(*spread) : Json(); }
+Json optional_spread(const std::optional<lab::Spread> &spread) { return spread ? spread_json(*spread) : Json(); }
 
 Json row_json(const lab::ExecutorResults &results, const std::string &name, std::size_t dag, bool is_dag) {
   Json json{{"name", name}};
   json.update(counts_json(results.jobs(dag)));
-  json["miss_ratio"] = to_json(results.late(dag));
-  json["miss_ratio_with_lost"] = to_json(results.miss(dag));
+  json["miss_ratio"] = spread_json(results.late(dag));
+  json["miss_ratio_with_lost"] = spread_json(results.miss(dag));
   if (is_dag) {
     json["end_to_end_late"] = results.late_end_to_end(dag);
     json["end_to_end_p50_ns"] = optional_spread(results.end_to_end(dag, &metrics::Distribution::p50));
@@ -60,7 +60,7 @@ Json row_json(const lab::ExecutorResults &results, const std::string &name, std:
     json["end_to_end_max_ns"] = longest ? Json(*longest) : Json();
   }
   json["repetitions"] = Json::array();
-  for (const auto &repetition : results.repetitions) json["repetitions"].push_back(to_json(repetition[dag], is_dag));
+  for (const auto &repetition : results.repetitions) json["repetitions"].push_back(dag_json(repetition[dag], is_dag));
   return json;
 }
 
@@ -107,11 +107,8 @@ std::string legend(const lab::Comparison &comparison, std::size_t repetitions) {
   const bool several = std::any_of(comparison.executors.front().repetitions.front().begin(),
                                    comparison.executors.front().repetitions.front().end(),
                                    [](const metrics::DagSummary &seen) { return seen.end_to_end.sinks.size() > 1; });
-  if (several)
-    text +=
-        ";\n"
-        "with several sinks, each figure is that of the worst one";
-  if (repetitions > 1) text += ";\nmax is the largest of all repetitions; p50 to p99 are medians over repetitions";
+  if (several) text += "; with several sinks, each figure is that of the worst one";
+  if (repetitions > 1) text += "; max is the largest of all repetitions; p50 to p99 are medians over repetitions";
   return text + "\n\n";
 }
 

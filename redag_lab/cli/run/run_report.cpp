@@ -23,15 +23,15 @@ namespace {
 constexpr std::size_t kMostTasks = 50;  // with more tasks, the table shows only this many, the worst
 
 // Formats a duration, or "-" if there is none.
-Cell time_cell(const metrics::Distribution &distribution, Duration metrics::Distribution::*value) {
+Cell spread_cell(const metrics::Distribution &distribution, Duration metrics::Distribution::*value) {
   return {distribution.count > 0 ? humanize_duration(distribution.*value) : "-"};
 }
 
-Cell count_cell(std::uint64_t count, Tint tint = Tint::Plain) {
+Cell jobs_cell(std::uint64_t count, Tint tint = Tint::Plain) {
   return {format_count(count), count > 0 ? tint : Tint::Faint};
 }
 
-Cell missed_cell(const metrics::JobCounts &jobs) {
+Cell missed_jobs_cell(const metrics::JobCounts &jobs) {
   return {format_count_and_share(jobs.missed(), jobs.released), jobs.missed() > 0 ? Tint::Bad : Tint::Good};
 }
 
@@ -70,15 +70,15 @@ std::string task_table(const lab::Session &session, const StreamTraits &terminal
     const metrics::JobStats &jobs = task.jobs;
     const bool late = jobs.max_lateness.value_or(0) > 0;
     table.add({{task.dag + "." + task.name},
-               count_cell(jobs.released),
-               count_cell(jobs.late, Tint::Bad),
-               count_cell(jobs.skipped, Tint::Bad),
-               count_cell(jobs.aborted, Tint::Bad),
-               missed_cell(jobs),
-               time_cell(jobs.response, &metrics::Distribution::p50),
-               time_cell(jobs.response, &metrics::Distribution::p95),
-               time_cell(jobs.response, &metrics::Distribution::p99),
-               {time_cell(jobs.response, &metrics::Distribution::max).text, late ? Tint::Bad : Tint::Plain},
+               jobs_cell(jobs.released),
+               jobs_cell(jobs.late, Tint::Bad),
+               jobs_cell(jobs.skipped, Tint::Bad),
+               jobs_cell(jobs.aborted, Tint::Bad),
+               missed_jobs_cell(jobs),
+               spread_cell(jobs.response, &metrics::Distribution::p50),
+               spread_cell(jobs.response, &metrics::Distribution::p95),
+               spread_cell(jobs.response, &metrics::Distribution::p99),
+               {spread_cell(jobs.response, &metrics::Distribution::max).text, late ? Tint::Bad : Tint::Plain},
                {humanize_duration(refs[i].task->deadline)}});
   }
   std::string text = table.render(terminal.width, terminal.colour);
@@ -103,11 +103,11 @@ std::string dag_table(const lab::Session &session, const StreamTraits &terminal)
     const std::string bound = dag.max_active > 0 ? fmt::format("{}", dag.max_active) : "-";
     std::vector<Cell> row = {
         {dag.name},
-        count_cell(dag.jobs.released),
-        missed_cell(dag.jobs),
-        time_cell(end_to_end, &metrics::Distribution::p50),
-        time_cell(end_to_end, &metrics::Distribution::p99),
-        {time_cell(end_to_end, &metrics::Distribution::max).text, dag.end_to_end.late > 0 ? Tint::Bad : Tint::Plain},
+        jobs_cell(dag.jobs.released),
+        missed_jobs_cell(dag.jobs),
+        spread_cell(end_to_end, &metrics::Distribution::p50),
+        spread_cell(end_to_end, &metrics::Distribution::p99),
+        {spread_cell(end_to_end, &metrics::Distribution::max).text, dag.end_to_end.late > 0 ? Tint::Bad : Tint::Plain},
         {dag.end_to_end.deadline > 0 ? humanize_duration(dag.end_to_end.deadline) : "-"},
         {fmt::format("{}/{}", dag.peak_active, bound)}};
     if (has_clusters) row.push_back({workload.dags[d].cluster});
@@ -124,9 +124,7 @@ std::string legend(const lab::Session &session) {
   const auto &dags = session.summary.dags;
   const bool several =
       std::any_of(dags.begin(), dags.end(), [](const auto &dag) { return dag.end_to_end.sinks.size() > 1; });
-  return text + (several ? ";\n"
-                           "with several sinks, each figure is that of the worst one\n"
-                         : "\n");
+  return text + (several ? "; with several sinks, each figure is that of the worst one\n" : "\n");
 }
 
 std::string verdict_line(const lab::Session &session, const StreamTraits &terminal) {
