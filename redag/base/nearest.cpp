@@ -30,14 +30,16 @@ std::size_t edit_distance(std::string_view a, std::string_view b, std::size_t li
 std::string_view nearest(std::string_view name, const std::vector<std::string_view> &candidates) {
   std::size_t limit = std::min<std::size_t>(name.size() / 2, 3);
   std::string_view best;
+  bool is_tied = false;
   for (const std::string_view candidate : candidates) {
     const std::size_t distance = edit_distance(name, candidate, limit);
     if (distance > limit) continue;
+    is_tied = !best.empty() && distance == limit;
     best = candidate;
-    if (distance <= 1) break;
-    limit = distance - 1;
+    if (distance <= 1) return best;
+    limit = distance;
   }
-  return best;
+  return is_tied ? std::string_view() : best;
 }
 
 std::string suggestion(std::string_view given, const std::vector<std::string> &candidates) {

@@ -15,7 +15,7 @@ namespace redag {
 /// beyond `limit` and returns limit + 1.
 [[nodiscard]] std::size_t edit_distance(std::string_view a, std::string_view b, std::size_t limit);
 
-/// Returns the nearest candidate within three edits and half the length of `name`, the first of several; empty: none.
+/// Returns the nearest candidate within three edits and half the length of `name`; empty: none, or several equally far.
 [[nodiscard]] std::string_view nearest(std::string_view name, const std::vector<std::string_view> &candidates);
 
 /// Returns the nearest candidate as "did you mean 'x'?", or else the list "one of a, b, c".

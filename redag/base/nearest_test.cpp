@@ -29,6 +29,8 @@ TEST(Nearest, IsOnlyOfferedWhenItIsNear) {
   EXPECT_EQ(nearest("x", {"y"}), "");
   EXPECT_EQ(nearest("colour", {"name", "wcet", "group"}), "");
   EXPECT_EQ(nearest("a1", {}), "");
+  EXPECT_EQ(nearest("tcsh", {"bash", "zsh", "fish"}), "") << "each is two edits away";
+  EXPECT_EQ(nearest("bsh", {"zsh", "bash", "fish"}), "zsh");
 }
 
 }  // namespace

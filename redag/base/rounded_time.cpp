@@ -6,8 +6,12 @@
 namespace redag {
 namespace {
 
-// The unit of the fourth significant digit.
+// The smaller unit that humanize_duration() writes, or that of the fourth significant digit.
 Duration step_of(Duration duration) {
+  constexpr Duration kMinutes = 60 * kSecond;
+  constexpr Duration kHours = 60 * kMinutes;
+  if (duration >= 24 * kHours || duration <= -24 * kHours) return kHours;
+  if (duration >= kHours || duration <= -kHours) return kMinutes;
   Duration step = 1;
   while (duration / step >= 10'000 || duration / step <= -10'000) step *= 10;
   return step;

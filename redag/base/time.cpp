@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstdlib>
 
 #include <fmt/format.h>
 
@@ -32,6 +33,20 @@ const Unit *find_unit(std::string_view name) {
     if (unit.name == name) return &unit;
   }
   return nullptr;
+}
+
+constexpr Duration kHour = 3600 * kSecond;
+constexpr Duration kDay = 24 * kHour;
+
+// Returns "5h 33min" or "12d 7h", rounded to the smaller unit.
+std::string long_duration(Duration duration) {
+  const Duration step = duration >= kDay || duration <= -kDay ? kHour : 60 * kSecond;
+  const Duration whole = std::abs(duration / step + duration % step / (step / 2));  // in steps
+  const Duration unit = whole * step >= kDay ? kDay : kHour;
+  const Duration small = unit == kDay ? kHour : 60 * kSecond;
+  const Duration rest = whole * step % unit / small;
+  const std::string text = fmt::format("{}{}", whole * step / unit, unit == kDay ? "d" : "h");
+  return rest == 0 ? text : fmt::format("{} {}{}", text, rest, unit == kDay ? "h" : "min");
 }
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
@@ -146,6 +161,7 @@ std::string format_duration(Duration duration) {
 }
 
 std::string humanize_duration(Duration duration) {
+  if (duration >= kHour || duration <= -kHour) return (duration < 0 ? "-" : "") + long_duration(duration);
   const double magnitude = std::fabs(static_cast<double>(duration));
   for (const Unit &unit : kUnits) {
     if (unit.nanoseconds > kSecond || magnitude < static_cast<double>(unit.nanoseconds)) continue;

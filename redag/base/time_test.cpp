@@ -117,6 +117,11 @@ TEST(HumanizeDuration, RoundsToFourDigits) {
   EXPECT_EQ(humanize_duration(-12'345'678), "-12.35ms");
   EXPECT_EQ(humanize_duration(0), "0s");
   EXPECT_EQ(humanize_duration(999), "999ns");
+  EXPECT_EQ(humanize_duration(63'360 * kMillisecond), "63.36s");
+  EXPECT_EQ(humanize_duration(20'000 * kSecond), "5h 33min");
+  EXPECT_EQ(humanize_duration(3600 * kSecond), "1h");
+  EXPECT_EQ(humanize_duration(-86'399 * kSecond), "-1d");
+  EXPECT_EQ(humanize_duration(33'333'333 * kSecond), "385d 19h");
 }
 
 }  // namespace

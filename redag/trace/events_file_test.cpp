@@ -93,6 +93,19 @@ TEST_F(EventsFile, OfBeforeThereWasProvenanceIsRead) {
   EXPECT_FALSE(parse_trace("{\"format\":\"redag.events/1\",\"provenance\":7,\"run\":{}}\n", "file"));
 }
 
+TEST_F(EventsFile, PreemptionHasTheNameOfItsMode) {
+  Trace before = example();
+  before.info.config.preemption = sched::Preemption::Full;
+  std::string text = written(before);
+  const std::string name = R"("preemption":"os")";
+  const std::size_t place = text.find(name);
+  ASSERT_NE(place, std::string::npos);
+  text.replace(place, name.size(), R"("preemption":"full")");  // in older files
+  const Result<Trace> after = parse_trace(text, "file");
+  ASSERT_TRUE(after) << to_string(after.error());
+  EXPECT_EQ(after->info.config.preemption, sched::Preemption::Full);
+}
+
 TEST_F(EventsFile, EveryDriverIsReadBack) {
   for (const char *name : {"simulator", "threads", "ros", "ros_nodes"}) {
     std::string text = written(example());

@@ -77,7 +77,9 @@ sched::Config config_from(const Json &json) {
   constexpr std::uint32_t kAny = std::numeric_limits<std::uint32_t>::max();
   sched::Config config;
   config.workers = small_of(json, "workers", 1, kMaxWorkers);
-  config.preemption = one_of(kPreemptions, preemption_name, text_of(json, "preemption"), "preemption");
+  std::string preemption = text_of(json, "preemption");
+  if (preemption == "full") preemption = preemption_name(sched::Preemption::Full);  // in older files
+  config.preemption = one_of(kPreemptions, preemption_name, preemption, "preemption");
   config.policy = one_of(
       kPolicies, [](PolicyKind p) { return to_string(p); }, text_of(json, "policy"), "policy");
   // Files from before ties were shared do not state them; their order was fixed.

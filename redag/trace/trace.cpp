@@ -45,7 +45,7 @@ const char *preemption_name(sched::Preemption mode) {
   switch (mode) {
     case sched::Preemption::None: return "none";
     case sched::Preemption::Cooperative: return "cooperative";
-    case sched::Preemption::Full: return "full";
+    case sched::Preemption::Full: return "os";
   }
   return "?";
 }

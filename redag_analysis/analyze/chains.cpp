@@ -3,6 +3,7 @@
 
 #include "redag_analysis/analyze/chains.hpp"
 
+#include <algorithm>
 #include <numeric>
 
 #include "redag/sched/policy.hpp"
@@ -20,6 +21,12 @@ bool hands_over(const TaskSet &task_set, TaskId from, TaskId to) {
 
 // The response from the unit's release. A task of a larger unit may be bounded only from its own release, but its DAG
 // is bounded from the unit's.
+// Such edges shift the releases of tasks in their own DAG. Those of other DAGs stay periodic.
+bool joins_rates(const TaskSet &task_set, const CompiledDag &dag) {
+  return std::any_of(dag.units.begin(), dag.units.end(),
+                     [&](std::uint32_t unit) { return !task_set.units[unit].awaits.empty(); });
+}
+
 const ResponseBound *response_of(const TaskSet &task_set, TaskId task, const Bound &bound) {
   const CompiledTask &compiled = task_set.tasks[task.value];
   const bool single = task_set.units[compiled.unit].tasks.size() == 1;
@@ -57,7 +64,17 @@ std::variant<NotApplicable, ChainBound> chain_bound(const TaskSet &task_set, std
                                                     const Bound &bound) {
   if (chain.empty()) return NotApplicable{"the chain has no tasks"};
   if (!task_set.not_analysable.empty() && !task_set.has_waits) return NotApplicable{task_set.not_analysable};
-  if (auto reason = why_not_directly(task_set)) return NotApplicable{*reason};
+  if (!task_set.has_rate_edges()) {
+    if (auto reason = why_not_directly(task_set)) return NotApplicable{*reason};
+  } else if (task_set.threads_suffice_if_bounded) {
+    return NotApplicable{"there are fewer threads than tasks, and edges join tasks of different periods or offsets"};
+  }
+  for (const TaskId task : chain) {
+    const CompiledDag &dag = task_set.dags[task_set.tasks[task.value].dag.value];
+    if (joins_rates(task_set, dag)) {
+      return NotApplicable{"edges join tasks of different periods or offsets in DAG '" + dag.name + "'"};
+    }
+  }
   ChainBound result;
   for (std::size_t i = 0; i < chain.size(); ++i) {
     if (i > 0 && hands_over(task_set, chain[i - 1], chain[i])) {

@@ -210,6 +210,36 @@ TEST(ChainProperty, OfTasksThatWait) {
   }
 }
 
+TEST(ChainProperty, BesideEdgesBetweenRates) {
+  for (const std::uint32_t workers : {1U, 3U}) {
+    testing::BoundCaseLimits limits = periodic(workers, sched::Preemption::Full, true);
+    limits.rates = true;
+    limits.caps = false;
+    expect_chains_hold(dag_bounded(), limits, 300);
+  }
+}
+
+// An edge between rates shifts the releases of its own DAG only.
+TEST(Chain, EdgesBetweenRatesOfAnotherDagDoNotMatter) {
+  Workload workload = testing::independent({{1, 10}, {1, 20}}, 1, PolicyKind::RateMonotonic);
+  Task joined = workload.dags[1].tasks[0];
+  joined.name = "joined";
+  joined.period = joined.deadline = 40;
+  joined.predecessors = {0};
+  workload.dags[1].tasks.push_back(joined);
+  const TaskSet task_set = testing::compiled(workload);
+  ASSERT_TRUE(task_set.has_rate_edges());
+  const Report report = analyze(task_set);
+  const auto of = [&](std::uint32_t task) {
+    return chain_bound(task_set, std::vector{TaskId(task)}, tightest_of(report));
+  };
+  ASSERT_TRUE(std::holds_alternative<ChainBound>(of(0)));
+  EXPECT_EQ(std::get<ChainBound>(of(0)).sum, 10 + 1);
+  ASSERT_TRUE(std::holds_alternative<NotApplicable>(of(1)));
+  EXPECT_EQ(std::get<NotApplicable>(of(1)).reason,
+            "edges join tasks of different periods or offsets in DAG '" + workload.dags[1].name + "'");
+}
+
 // The producer ends 12 after its release. Meanwhile the consumer, less urgent and released with it, has read old data.
 TEST(Chain, AProducerThatWaitsDoesNotGoFirst) {
   Workload workload = testing::independent({{4, 20}, {1, 20}}, 1, PolicyKind::Fixed);

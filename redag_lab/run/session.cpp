@@ -41,7 +41,7 @@ trace::RunInfo describe_simulation(const Workload &workload, const Variant &vari
   info.executor = variant.executor;
   info.config = executors::effective_config(*executors::find_executor(variant.executor), sched::config_of(workload));
   info.config.workers = workload.platform.workers;  // configure() set those that the executor uses
-  info.preemption = mode_name(info.config.preemption);
+  info.preemption = trace::preemption_name(info.config.preemption);
   const PreemptionMode wanted = workload.platform.preemption;
   if (wanted == PreemptionMode::Os || wanted == PreemptionMode::Auto) {
     info.preemption_why = fmt::format("{}at any instant, with no cost except --overhead-preempt",

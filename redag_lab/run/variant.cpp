@@ -77,13 +77,4 @@ Result<Workload> configure(const Workload &workload, const Variant &variant) {
   return tl::unexpected<Diagnostics>(std::move(mistakes));
 }
 
-const char *mode_name(sched::Preemption preemption) {
-  switch (preemption) {
-    case sched::Preemption::None: return to_string(PreemptionMode::None);
-    case sched::Preemption::Cooperative: return to_string(PreemptionMode::Cooperative);
-    case sched::Preemption::Full: return to_string(PreemptionMode::Os);
-  }
-  return "?";
-}
-
 }  // namespace redag::lab

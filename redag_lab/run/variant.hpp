@@ -35,9 +35,6 @@ struct Variant {
 /// executor cannot run it.
 [[nodiscard]] Result<Workload> configure(const Workload &workload, const Variant &variant);
 
-/// Returns the mode's name in workloads and on the command line: full preemption is "os".
-[[nodiscard]] const char *mode_name(sched::Preemption preemption);
-
 /// Parses a list such as "redag,mte" with at least one name and none twice.
 [[nodiscard]] Result<std::vector<Variant>> parse_variants(std::string_view list);
 

@@ -73,7 +73,12 @@ class Clusters(Case):
         text = self.expect(redag("analyze", self.clusters, "--explain", "b.t"), 0).stdout
         self.assertTrue(text.startswith("b.t: response time at most 5ms"), text)
         self.expect(redag("analyze", self.clusters, "--explain", "d.t"), 2, "there is no task or DAG 'd.t'")
-        self.expect(redag("analyze", self.clusters, "--chain", "a.t,b.t"), 2)
+        self.expect(redag("analyze", self.clusters, "--explain", "b.tt"), 2, "did you mean 'b.t'?")
+        self.expect(redag("analyze", self.clusters, "--chain", "a.t,b.t"), 2,
+                    "--chain: 'a.t' is in cluster 'left', and 'b.t' in cluster 'right'", "within one cluster")
+        self.expect(redag("analyze", self.clusters, "--chain", "b.t,d.t"), 2, "there is no task or DAG 'd.t'")
+        self.assertIn("b.t", self.expect(redag("analyze", self.clusters, "--chain", "b.t"), 0).stdout)
+        self.assertIn("a.t > c.t", self.expect(redag("analyze", self.clusters, "--chain", "a.t,c.t"), 0).stdout)
 
     def test_run_without_a_miss(self):
         for command in ("simulate", "--executor", "redag"), ("simulate", "--executor", "redag-none"):
@@ -155,6 +160,15 @@ dags:
         self.expect(redag("analyze", self.cart, "--method", "quite_another"), 2, "one of ")
         self.assertNotIn("tasks", json.loads(redag("analyze", self.cart, "--json").stdout)["methods"][0])
 
+    def test_methods_without_a_workload(self):
+        methods = self.document(redag("analyze", "--methods", "--json"), "redag.methods/1")["methods"]
+        shown = [line.split(" (")[0] for line in redag("analyze", "--methods").stdout.splitlines() if re.match(r"\w+ \(", line)]
+        self.assertEqual([method["name"] for method in methods], shown)
+        self.assertTrue(all(method["cite"] and method["complexity"] for method in methods))
+        stated = re.search(r"by (\d+) published and derived methods", (SOURCE / "README.md").read_text())
+        self.assertEqual(int(stated[1]), len(methods), "README.md")
+        self.expect(redag("analyze", "--methods", "--json", "--explain", "a.x"), 2, "FILE is required")
+
     def test_overrides_and_check(self):
         self.expect(redag("analyze", self.cart, "--check"), 1)
         preempted = self.expect(redag("analyze", self.cart, "--check", "--preemption", "os"), 0)
@@ -203,6 +217,21 @@ dags:
         self.expect(redag("analyze", self.cart, "--chain", "fast.sense,slow.plam"), 2, "did you mean 'slow.plan'?")
         self.expect(redag("analyze", self.cart, "--chain", "fast"), 2, "'fast' is a DAG")
         self.expect(redag("analyze", self.cart, "--chain", "fast.act", "--executor", "ste"), 2, "available for ReDAG-RT only")
+
+    def test_an_option_that_takes_the_file_for_its_value(self):
+        for option in ("--explain", "--chain", "--method"):
+            self.expect(redag("analyze", option, self.cart), 2, "FILE is required",
+                        f"{option} has taken '{self.cart}' as its value")
+        self.expect(redag("simulate", "--executor", self.cart), 2)
+        self.expect(redag("sensitivity", "--task", self.cart), 2, f"--task has taken '{self.cart}' as its value")
+
+    def test_edges_between_rates_of_another_dag(self):
+        text = CART + "  - name: mixed\n    tasks: [{name: a, wcet: 1ms, period: 50ms}, {name: b, wcet: 1ms, period: 100ms, after: a}]\n"
+        mixed = self.write("mixed.yaml", text)
+        bounded = json.loads(self.expect(redag("analyze", mixed, "--preemption", "os", "--json", "--chain", "fast.sense,fast.act",
+                                               "--chain", "mixed.a"), 0).stdout)["chains"]
+        self.assertIsNotNone(bounded[0]["reaction_ns"])
+        self.assertIn("in DAG 'mixed'", bounded[1]["reason"])
 
     def test_unknown_task(self):
         self.expect(redag("analyze", self.cart, "--explain", "slow.plam"), 2, "did you mean 'slow.plan'?")

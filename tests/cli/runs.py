@@ -77,17 +77,17 @@ class Calibrate(Case):
         self.expect(redag("calibrate", "--duration", "200h"), 2, "longer than a day")
         self.expect(redag("calibrate", "--duration", "1s", "--out", self.folder / "no" / "folder.yaml"), 2, "folder.yaml")
 
-    def test_interrupted_it_writes_what_it_has(self):
-        path = self.folder / "partial.yaml"
+    def test_interrupted_it_shows_what_it_has_and_writes_nothing(self):
+        path = self.write("before.yaml", "of an earlier calibration\n")
         with subprocess.Popen([PROGRAM, "calibrate", "--duration", "10min", "--loaded", "--out", path], text=True,
                               stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
             interrupt(process, after=5)
             out, error = process.communicate(timeout=60)
-        self.assertEqual(process.returncode, 0, error)
-        self.assertIn("the calibration is incomplete", error)
+        self.assertEqual(process.returncode, 2, error)
+        self.assertIn("interrupted: ", error)
+        self.assertIn("before.yaml is not written", error)
         self.assertIn("incomplete: the calibration ended early", out)
-        self.assertIn("complete: false", path.read_text())
-        self.expect(redag("analyze", self.cart, "--overheads", path), 0)
+        self.assertEqual(path.read_text(), "of an earlier calibration\n")
 
 
 class Simulate(Case):
@@ -257,6 +257,18 @@ class Waits(Case):
         for arguments in (["run", "--executor", "mte"], ["simulate", "--executor", "mte"], ["compare"]):
             with self.subTest(arguments=arguments):
                 self.expect(redag(arguments[0], self.FILE, *arguments[1:]), 2, where, "segments, which cannot be handled here")
+        for executors in ("redag,mte,ste", "mte,redag-none,ste"):
+            for file, text in ((self.FILE, None), ("-", self.FILE.read_text())):
+                self.expect(redag("compare", file, "--executors", executors, text=text), 2,
+                            "--executors: segments cannot be simulated for mte, ste", "redag-cooperative and redag-os")
+
+    def test_compared(self):
+        result = redag("compare", self.FILE, "--simulate", "--executors", "redag,redag-none", "--duration", "2s", "--json")
+        of = {each["name"]: each for each in self.document(result, "redag.comparison/2")["executors"]}
+        self.assertEqual(set(of), {"redag", "redag-none"})
+        result = redag("compare", self.FILE, "--executors", "redag-none,redag-cooperative", "--duration", "500ms",
+                       "--repeat", "1")
+        self.assertIn("redag-cooperative", self.expect(result, 0).stdout)
 
     def segments(self):
         return next(line for line in self.FILE.read_text().splitlines() if "segments:" in line)
@@ -296,6 +308,18 @@ class Streams(Case):
             self.assertEqual(len(table), 6, text)
             self.assertLessEqual(max(map(len, table)), columns, text)
         self.assertIn("no room for", text)
+        for columns in (60, 40):
+            for command in ([], ["simulate"], ["experiment"]):
+                text = redag(*command, "--help", env={**os.environ, "COLUMNS": str(columns)}).stdout
+                prose = [line for line in text.split("Examples:")[0].splitlines() if not line.startswith("Usage:")]
+                self.assertLessEqual(max(map(len, prose)), columns, text)
+            # Only the ends of paragraphs are short: a line that was broken before would be broken again.
+            text = redag("simulate", SOURCE / "workloads" / "robot.yaml", "--duration", "1s",
+                         env={**os.environ, "COLUMNS": str(columns)}).stdout
+            self.assertNotRegex(text, r"\w;\n\w")
+
+    def test_no_progress_in_a_pipe(self):
+        self.assertNotIn(" %, ", self.expect(redag("run", self.cart, "--duration", "6s"), 0).stderr)
 
     def test_progress_on_a_terminal(self):
         _, text = in_terminal("run", self.cart, "--duration", "1s")

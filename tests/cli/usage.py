@@ -22,6 +22,14 @@ class Usage(Case):
     def test_version(self):
         self.assertRegex(self.expect(redag("--version"), 0).stdout, r"^redag \d+\.\d+\.\d+ \(revision \S+\)\n$")
 
+    def test_help_and_version_are_words_too(self):
+        for words in (["version"], ["-V"]):
+            self.assertEqual(redag(*words).stdout, redag("--version").stdout)
+        self.assertEqual(self.expect(redag("help"), 0).stdout, redag("--help").stdout)
+        for command in COMMANDS:
+            self.assertEqual(self.expect(redag("help", *command), 0).stdout, redag(*command, "--help").stdout)
+        self.expect(redag("help", "simulat"), 2, "unknown command 'simulat' (did you mean 'simulate'?)")
+
     def test_no_arguments(self):
         self.expect(redag(), 2, "Commands:", "check-trace")
 
@@ -53,6 +61,7 @@ class Usage(Case):
                 self.assertTrue(any(re.search(rf"{option}\b", text) for text in texts), (heading and heading[1], option))
 
     def test_mistakes_are_near_something(self):
+        self.expect(redag("completion", "tcsh"), 2, "'tcsh' is not a valid choice (one of bash, zsh, fish)")
         self.expect(redag("simualte", self.cart), 2, "did you mean 'simulate'?")
         self.expect(redag("simulate", self.cart, "--durtion", "1s"), 2, "did you mean '--duration'?")
         self.expect(redag("simulate", self.cart, "--policy", "rate_monotonc"), 2, "did you mean 'rate_monotonic'?")

@@ -13,7 +13,7 @@ import re
 import subprocess
 import sys
 
-from program import SOURCE, Case, in_terminal, main, redag
+from program import CART, SOURCE, Case, in_terminal, main, redag
 
 # Takes processor CPU at a high real-time priority for 6 ms of every 33 ms, until it is killed: it comes at another phase
 # of a period of 10 ms each time, so that some jobs are late because of it wherever it begins.
@@ -118,9 +118,26 @@ class Why(Case):
         record.write_text("nonsense\n")
         self.expect(redag("why", folder), 2, "kernel.jsonl.gz:1", "not a kernel's record")
         record.unlink()
-        self.expect(redag("compare", SOURCE / "workloads" / "robot.yaml", "--simulate", "--duration", "1s", "--out",
-                          self.folder / "many"), 0)
-        self.expect(redag("why", self.folder / "many"), 2, "runs", "name one of them")
+        for command in ("why", "events", "check-trace", "report"):
+            self.expect(redag(command, self.cart), 2, "this is a workload, and not a recorded run", "redag simulate")
+
+    def test_of_a_comparison_the_worst_repetition(self):
+        file = self.write("random.yaml", CART.replace("wcet: 25ms", "wcet: 25ms, bcet: 5ms"))
+        many = self.folder / "many"
+        self.expect(redag("compare", file, "--simulate", "--duration", "2s", "--repeat", "4", "--executors", "redag-none,mte",
+                          "--out", many), 0)
+        missed = {path.parent: json.loads(path.read_text())["total"]["missed"]
+                  for path in sorted(many.glob("redag-none/*/summary.json"))}
+        worst = max(missed, key=missed.get)
+        self.assertNotEqual(worst, min(missed), "another one than the first")
+        note = f"{many} holds 8 runs; this is {worst}, in which redag-none missed most deadlines ({missed[worst]})\n"
+        why = self.expect(redag("why", many), 0)
+        self.assertEqual((why.stdout, why.stderr), (redag("why", worst).stdout.replace(str(worst), str(many)), note))
+        self.assertEqual(redag("events", many).stdout, redag("events", worst).stdout)
+        self.assertEqual(redag("events", many).stderr, note)
+        self.expect(redag("why", many / "mte"), 0, "holds 4 runs; this is ")
+        (many / "comparison.json").unlink()
+        self.expect(redag("why", many), 2, "holds 8 runs", f"name one of them, such as '{many / 'mte'}")
 
     def test_the_kernels_record_names_the_other_program(self):
         cpu = max(os.sched_getaffinity(0))

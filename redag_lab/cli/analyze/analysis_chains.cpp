@@ -51,14 +51,22 @@ std::string name_of(const lab::Analysed &analysed, const ChainSegment &segment) 
 
 }  // namespace
 
-Result<ChainRow> find_chain(const lab::Analysed &analysed, const std::string &chain) {
-  ChainRow row;
+std::vector<std::string> names_in(const std::string &chain) {
+  std::vector<std::string> names;
   for (std::size_t begin = 0; begin <= chain.size();) {
     const std::size_t end = std::min(chain.find(',', begin), chain.size());
-    const Result<TaskId> task = find_task(analysed, chain.substr(begin, end - begin));
+    names.push_back(chain.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return names;
+}
+
+Result<ChainRow> find_chain(const lab::Analysed &analysed, const std::string &chain) {
+  ChainRow row;
+  for (const std::string &name : names_in(chain)) {
+    const Result<TaskId> task = find_task(analysed, name);
     if (!task) return tl::unexpected<Diagnostics>(task.error());
     row.tasks.push_back(*task);
-    begin = end + 1;
   }
   row.bound = analysis::chain_bound(analysed.task_set, row.tasks, analysis::tightest_of(analysed.report));
   row.let = let_reaction_of(analysed, row.tasks);
@@ -87,7 +95,7 @@ std::string describe(const lab::Analysed &analysed, const std::vector<ChainRow> 
   return table.render(terminal.width, terminal.colour) + parts +
          "reaction: largest time from an input to an output that depends on it\n"
          "age: largest age of the input behind an output, until the next output\nBoth assume strictly periodic timers. "
-         "LET: both, exactly, if tasks read at their\nrelease and write at their deadline\n";
+         "LET: both, exactly, if tasks read at their release and write at their deadline\n";
 }
 
 Json to_json(const lab::Analysed &analysed, const std::vector<ChainRow> &chains) {

@@ -23,6 +23,9 @@ struct ChainRow {
   std::optional<Duration> let;
 };
 
+/// Returns the parts of "dag.task,dag.task,...".
+[[nodiscard]] std::vector<std::string> names_in(const std::string &chain);
+
 /// Bounds the chain "dag.task,dag.task,..." with the tightest bounds of the tasks and DAGs. Error: malformed, or a name
 /// without a task.
 [[nodiscard]] Result<ChainRow> find_chain(const lab::Analysed &analysed, const std::string &chain);

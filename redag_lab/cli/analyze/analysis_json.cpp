@@ -2,6 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Writes the document `redag.analysis/1`, whose keys docs/cli.md lists.
+#include <utility>
+
+#include "redag_analysis/analyze/executors.hpp"
 #include "redag_lab/cli/analyze/analysis_report.hpp"
 
 namespace redag::cli {
@@ -49,23 +52,27 @@ Json bounds_json(const std::vector<analysis::ResponseBound> &bounds, const std::
   return list;
 }
 
-Json method_json(const MethodReport &report) {
-  const Method &method = *report.method;
-  const analysis::Bound *bound = report.bound();
+Json method_json(const Method &method) {
   return Json{{"name", std::string(method.name)},
               {"subject", to_string(method.subject)},
-              {"applies", bound != nullptr},
-              {"gave_up", report.gave_up()},
-              {"reason", bound == nullptr ? std::get<analysis::NotApplicable>(report.outcome).reason : ""},
-              {"sound", report.trusted},
-              {"unsound_because", bound != nullptr ? bound->unsound : ""},
-              {"schedulable", bound != nullptr && report.verdict == analysis::Verdict::Schedulable},
-              {"figures", bound != nullptr ? bound->figures : ""},
               {"paper", method.is_paper()},
               {"cite", std::string(method.cite)},
               {"assumptions", std::string(method.assumptions)},
               {"complexity", std::string(method.complexity)},
               {"sound_only_if", std::string(method.sound_only_if)}};
+}
+
+Json method_json(const MethodReport &report) {
+  const analysis::Bound *bound = report.bound();
+  Json json = method_json(*report.method);
+  json["applies"] = bound != nullptr;
+  json["gave_up"] = report.gave_up();
+  json["reason"] = bound == nullptr ? std::get<analysis::NotApplicable>(report.outcome).reason : "";
+  json["sound"] = report.trusted;
+  json["unsound_because"] = bound != nullptr ? bound->unsound : "";
+  json["schedulable"] = bound != nullptr && report.verdict == analysis::Verdict::Schedulable;
+  json["figures"] = bound != nullptr ? bound->figures : "";
+  return json;
 }
 
 const char *to_string(analysis::Exploration::End end) {
@@ -148,6 +155,14 @@ Json to_json(const lab::Analysed &analysed, bool each) {
   }
   if (analysed.exploration != nullptr) document["exploration"] = exploration_json(analysed);
   return document;
+}
+
+Json methods_json() {
+  Json all = Json::array();
+  for (const Method &method : analysis::methods()) all.push_back(method_json(method));
+  all.push_back(method_json(analysis::exploration()));
+  for (const Method &method : analysis::executor_methods()) all.push_back(method_json(method));
+  return Json{{"format", "redag.methods/1"}, {"methods", std::move(all)}};
 }
 
 }  // namespace redag::cli

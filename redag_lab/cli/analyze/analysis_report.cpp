@@ -10,8 +10,8 @@
 
 #include "redag/base/rounded_time.hpp"
 #include "redag/base/text.hpp"
+#include "redag/trace/trace.hpp"
 #include "redag_analysis/text/table.hpp"
-#include "redag_lab/run/variant.hpp"
 #include "redag_lab/search/remedy.hpp"
 
 namespace redag::cli {
@@ -93,8 +93,7 @@ std::string remark(const lab::Analysed &analysed, const MethodReport &report) {
 
 std::string method_table(const lab::Analysed &analysed, const StreamTraits &terminal) {
   if (analysed.task_set.is_beyond_all()) {
-    return fmt::format("none of the {} methods applies: {}\n", analysed.report.methods.size(),
-                       analysed.task_set.not_analysable);
+    return fmt::format("no method applies: {}\n", analysed.task_set.not_analysable);
   }
   std::vector<const MethodReport *> order;  // trusted methods first
   for (const bool trusted : {true, false}) {
@@ -123,11 +122,9 @@ std::string exploration_table(const lab::Analysed &analysed, const StreamTraits 
   }
   return table.render(terminal.width, terminal.colour) +
          fmt::format(
-             "best and worst response to the source's release, over all possible schedules with\nthe stated offsets "
-             "and jitter, execution times from bcet to wcet, and strictly\nperiodic timers{}\n",
-             exploration.exact ? ""
-                               : ";\n"
-                                 "with several workers the range can be too wide, but never too narrow");
+             "best and worst response to the source's release, over all possible schedules with the stated offsets "
+             "and jitter, execution times from bcet to wcet, and strictly periodic timers{}\n",
+             exploration.exact ? "" : "; with several workers the range can be too wide, but never too narrow");
 }
 
 // Returns what --explore found: a table, or one line that gives the reason for having none. Empty: not requested.
@@ -195,7 +192,9 @@ const char *to_string(lab::Standing standing) {
   return "?";
 }
 
-const char *mode_name(const lab::Analysed &analysed) { return lab::mode_name(analysed.task_set.platform.preemption); }
+const char *mode_name(const lab::Analysed &analysed) {
+  return trace::preemption_name(analysed.task_set.platform.preemption);
+}
 
 std::string mode_reason(const lab::Analysed &analysed) {
   const analysis::TaskSet &task_set = analysed.task_set;
@@ -257,12 +256,12 @@ std::string describe(const lab::Analysed &analysed, const StreamTraits &terminal
   }
   text += "\n" + table_of("DAG", lab::dag_rows(analysed), terminal) + "\n";
   text +=
-      "bound: response time from the nominal release that no job exceeds; for a DAG, and\nfor its tasks where edges "
-      "join them, from the source's release to the finish of\nthe last task; verdicts hold for every execution\n";
+      "bound: response time from the nominal release that no job exceeds; for a DAG, and for its tasks where edges "
+      "join them, from the source's release to the finish of the last task; verdicts hold for every execution\n";
   for (const lab::Row &row : tasks) {
     if (*row.due == row.deadline) continue;
     text +=
-        "slack: time to the deadline, or to the instant at which the next release would\nskip a job that has not "
+        "slack: time to the deadline, or to the instant at which the next release would skip a job that has not "
         "started, whichever is sooner\n";
     break;
   }

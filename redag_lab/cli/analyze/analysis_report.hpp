@@ -46,6 +46,9 @@ namespace redag::cli {
 /// Lists every method with its assumptions, citation and complexity.
 [[nodiscard]] std::string describe_methods();
 
+/// The same as `redag.methods/1`.
+[[nodiscard]] Json methods_json();
+
 /// Returns `redag.analysis/1`. `each` adds every method's bound of every task and DAG.
 [[nodiscard]] Json to_json(const lab::Analysed &analysed, bool each = false);
 

@@ -56,33 +56,55 @@ struct Asked {
   std::optional<lab::Row> row;  // of --explain
 };
 
-// Calls `find` for each part until one has it. Returns nothing, with the first part's error on the console, if none
-// has.
-template <class Find>
-bool find_in(const Parts &parts, const char *option, Console &console, Find find) {
-  std::optional<Diagnostic> first;
+// Returns where a task or DAG of this name is, or the error of the part with the nearest name.
+Result<std::size_t> part_with(const Parts &parts, const std::string &name) {
+  std::optional<Diagnostics> nearest;
   for (std::size_t p = 0; p < parts.size(); ++p) {
-    const Result<void> found = find(p);
-    if (found) return true;
-    if (!first) first = found.error().front();
+    const Result<lab::Row> found = find_row(parts[p].analysed, name);
+    if (found) return p;
+    if (!nearest || found.error().front().hint.rfind("did you mean", 0) == 0) nearest = found.error();
   }
-  console.error(fmt::format("{}: {}", option, first->message), first->hint);
-  return false;
+  return tl::unexpected<Diagnostics>(*std::move(nearest));
+}
+
+// Returns the part that has all tasks of a chain.
+Result<std::size_t> part_with_chain(const Parts &parts, const std::string &chain) {
+  std::optional<std::size_t> part;
+  std::string first;
+  for (const std::string &name : names_in(chain)) {
+    const Result<std::size_t> at = part_with(parts, name);
+    if (!at) return at;
+    if (!part) {
+      part = *at;
+      first = name;
+    }
+    if (*part == *at) continue;
+    return make_error(fmt::format("{} is in cluster {}, and {} in cluster {}", in_quotes(first),
+                                  in_quotes(parts[*part].part.name), in_quotes(name), in_quotes(parts[*at].part.name)),
+                      "a chain is bounded within one cluster: ask for its pieces one by one");
+  }
+  return *part;
 }
 
 // Finds what is asked of each part. Returns nothing, with an error on the console, if a task is unknown.
 std::optional<std::vector<Asked>> find_asked(const Parts &parts, const AnalyzeOptions &options, Console &console) {
   std::vector<Asked> asked(parts.size());
-  for (const std::string &chain : options.chains) {
-    const auto find = [&](std::size_t p) {
-      return find_chain(parts[p].analysed, chain).map([&](ChainRow row) { asked[p].chains.push_back(std::move(row)); });
-    };
-    if (!find_in(parts, "--chain", console, find)) return std::nullopt;
-  }
-  const auto find = [&](std::size_t p) {
-    return find_row(parts[p].analysed, options.explain).map([&](lab::Row row) { asked[p].row = std::move(row); });
+  const auto refuse = [&console](const char *option, const Diagnostics &why) {
+    console.error(fmt::format("{}: {}", option, why.front().message), why.front().hint);
+    return std::nullopt;
   };
-  if (!options.explain.empty() && !find_in(parts, "--explain", console, find)) return std::nullopt;
+  for (const std::string &chain : options.chains) {
+    const Result<std::size_t> part = part_with_chain(parts, chain);
+    if (!part) return refuse("--chain", part.error());
+    Result<ChainRow> row = find_chain(parts[*part].analysed, chain);
+    if (!row) return refuse("--chain", row.error());
+    asked[*part].chains.push_back(*std::move(row));
+  }
+  if (!options.explain.empty()) {
+    const Result<std::size_t> part = part_with(parts, options.explain);
+    if (!part) return refuse("--explain", part.error());
+    asked[*part].row = find_row(parts[*part].analysed, options.explain).value();
+  }
   return asked;
 }
 
@@ -192,15 +214,19 @@ Result<Parts> analyse_configured(const Workload &workload, const AnalyzeOptions 
   return analysed;
 }
 
-int analyze_file(const AnalyzeOptions &options, Console &console) {
+int analyze_file(const AnalyzeOptions &options, const CLI::App &command, Console &console) {
   if (options.analysis.run.file.empty()) {
-    const bool wants_file =
-        options.analysis.run.json || !options.explain.empty() || !options.chains.empty() || options.explore > 0;
+    const bool wants_file = !options.explain.empty() || !options.chains.empty() || options.explore > 0;
     if (options.methods && !wants_file) {
-      console.say(describe_methods());
+      if (options.analysis.run.json) {
+        console.print(to_text(methods_json()));
+      } else {
+        console.say(describe_methods());
+      }
       return kExitOk;
     }
-    console.error("FILE is required", "only --methods works without it");
+    console.error("FILE is required" + taken_for_value(command),
+                  "only --methods works without it, alone or with --json");
     return kExitBad;
   }
   if (options.explore > 0 && options.executor != "redag") {
@@ -264,7 +290,7 @@ Action add_analyze(CLI::App &app) {
       ->group("Limits");
   add_analysis_arguments(app, options->analysis,
                          "Exit with status 1 unless a sound method shows that every deadline is met");
-  return [options](Console &console) { return analyze_file(*options, console); };
+  return [options, &app](Console &console) { return analyze_file(*options, app, console); };
 }
 
 }  // namespace redag::cli

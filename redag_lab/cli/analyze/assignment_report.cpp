@@ -143,7 +143,7 @@ std::string in_words(const Assigned &assigned) {
   std::string text;
   const bool is_unchanged = assignment.best.workload == assignment.present.workload;
   if (is_unchanged && !after.schedulable && !after.extremes.any) {
-    text += "nothing to compare: no method bounds any response time, whatever was tried;\nsee 'redag analyze'\n";
+    text += "nothing to compare: no method bounds any response time, whatever was tried; see 'redag analyze'\n";
   } else if (is_unchanged) {
     text += fmt::format(
         "nothing to change: no other assignment that was tried has {}\n",
@@ -184,7 +184,7 @@ std::string describe(const Assigned &assigned, const StreamTraits &terminal, boo
     text += trials_table(assigned, terminal, all);
   }
   text += fmt::format(
-      "\nworst lateness and least slack are those of the bounds, which hold for every\nexecution; {} analyses\n"
+      "\nworst lateness and least slack are those of the bounds, which hold for every execution; {} analyses\n"
       "\n",
       format_count(assignment.analyses));
   for (const std::string &change : changes(assignment)) {

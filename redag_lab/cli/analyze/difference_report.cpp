@@ -22,8 +22,6 @@ using lab::DifferenceSide;
 using lab::FigureDifference;
 using lab::Verdict;
 
-constexpr std::size_t kMostTasks = 20;  // with more rows, only those with a difference are shown
-
 struct Figure {
   const char *name;
   FigureDifference lab::RowDifference::*value;
@@ -89,6 +87,47 @@ std::string longest_text(const DifferenceSide::Row &side) {
   return side.has_responses() ? humanize_duration(side.max) : "-";
 }
 
+bool differs(const DifferenceRow &row) { return row.is_any(Verdict::Better) || row.is_any(Verdict::Worse); }
+
+// All jobs together, what differs, and the DAGs of tasks that differ.
+bool is_shown(const DifferenceRow &row, const std::vector<DifferenceRow> &rows) {
+  if (row.a->dag.empty() || differs(row)) return true;
+  return row.a->task.empty() && std::any_of(rows.begin(), rows.end(), [&](const DifferenceRow &other) {
+           return other.a->dag == row.a->dag && differs(other);
+         });
+}
+
+std::size_t count_of(const Diffed &diffed, Verdict wanted) {
+  std::size_t count = 0;
+  for (const DifferenceRow &row : diffed.difference.rows) {
+    for (const Figure &figure : kFigures) count += row.*figure.verdict == wanted ? 1 : 0;
+  }
+  return count;
+}
+
+// Returns one sentence: who misses fewer deadlines, and how many figures differ.
+std::string conclusion(const Diffed &diffed) {
+  const std::size_t better = count_of(diffed, Verdict::Better);
+  const std::size_t worse = count_of(diffed, Verdict::Worse);
+  const DifferenceRow &all = diffed.difference.rows.front();
+  const auto missed = [](const DifferenceSide::Row &side) {
+    return format_count_and_share(side.jobs.missed(), side.jobs.released);
+  };
+  const std::string misses = fmt::format("{} instead of {} of all jobs", missed(*all.b), missed(*all.a));
+  std::string text;
+  switch (all.miss) {
+    case Verdict::Better: text = fmt::format("B misses fewer deadlines than A: {}", misses); break;
+    case Verdict::Worse: text = fmt::format("B misses more deadlines than A: {}", misses); break;
+    case Verdict::Same: text = fmt::format("A and B miss equally many deadlines: {}", misses); break;
+    case Verdict::NotTested: text = fmt::format("Too few jobs to compare the misses: {}", misses); break;
+  }
+  if (better + worse == 0) return text + "; no figure differs significantly";
+  const auto counted = [](std::size_t count, const char *what) {
+    return fmt::format("{} figure{} {} {}", count, count == 1 ? "" : "s", count == 1 ? "is" : "are", what);
+  };
+  return fmt::format("{}; {}, {}", text, counted(better, "better"), counted(worse, "worse"));
+}
+
 std::string differences_table(const Diffed &diffed, const StreamTraits &terminal, bool all) {
   Table table({{"", false, 9},
                {"jobs", true, 2},
@@ -98,10 +137,9 @@ std::string differences_table(const Diffed &diffed, const StreamTraits &terminal
                {"p95", true, 4},
                {"p99", true, 6},
                {"max", true, 5}});
-  const bool many = diffed.difference.rows.size() > kMostTasks && !all;
   std::size_t left_out = 0;
   for (const DifferenceRow &row : diffed.difference.rows) {
-    if (many && !row.a->task.empty() && !row.is_any(Verdict::Better) && !row.is_any(Verdict::Worse)) {
+    if (!all && !is_shown(row, diffed.difference.rows)) {
       ++left_out;
       continue;
     }
@@ -117,14 +155,17 @@ std::string differences_table(const Diffed &diffed, const StreamTraits &terminal
                {arrow(longest_text(*row.a), longest_text(*row.b)), Tint::Faint}});
   }
   std::string text = table.render(terminal.width, terminal.colour);
-  if (left_out > 0) text += fmt::format("({} tasks without a difference; --all-tasks shows them)\n", left_out);
+  if (left_out > 0)
+    text += fmt::format("({} row{} without a difference; --all-tasks shows all)\n", left_out, left_out == 1 ? "" : "s");
   return text;
 }
 
-// Returns every figure that differs by more than chance, worse ones first.
+// Returns every figure that differs by more than chance, beginning with those that agree with the conclusion.
 std::string findings(const Diffed &diffed, const StreamTraits &terminal) {
   std::string text;
-  for (const Verdict wanted : {Verdict::Worse, Verdict::Better}) {
+  const bool is_better = diffed.difference.rows.front().miss == Verdict::Better;
+  for (const Verdict wanted :
+       {is_better ? Verdict::Better : Verdict::Worse, is_better ? Verdict::Worse : Verdict::Better}) {
     for (const DifferenceRow &row : diffed.difference.rows) {
       for (const Figure &figure : kFigures) {
         if (row.*figure.verdict != wanted) continue;
@@ -152,9 +193,12 @@ std::vector<std::string> cautions(const Diffed &diffed) {
   std::vector<std::string> correlated;
   for (const DifferenceRow &row : diffed.difference.rows) {
     if (is_untested(row)) ++untested;
-    if (row.is_correlated()) correlated.push_back(row_name(row));
+    // Intervals that are too narrow find differences, and hide none.
+    if (row.is_correlated() && differs(row)) correlated.push_back(row_name(row));
   }
-  if (untested > 0) {
+  // What was found does not become doubtful by what was not tested.
+  const bool is_any = diffed.difference.is_any(Verdict::Better) || diffed.difference.is_any(Verdict::Worse);
+  if (untested > 0 && !is_any) {
     list.push_back(fmt::format(
         "{} of {} rows have figures that were not tested, because jobs are few or runs are short; run for longer",
         untested, diffed.difference.rows.size()));
@@ -240,20 +284,14 @@ std::vector<std::string> caveats(const DiffSide &a, const DiffSide &b) {
 }
 
 std::string describe(const Diffed &diffed, const StreamTraits &terminal, bool all) {
-  std::string text = "A  " + run_words(diffed.a) + "\nB  " + run_words(diffed.b) + "\n";
+  std::string text = tinted(conclusion(diffed), Tint::Strong, terminal.colour) + "\n\nA  " + run_words(diffed.a) +
+                     "\nB  " + run_words(diffed.b) + "\n";
   for (const lab::Change &change : diffed.changes)
     text += tinted("differs ", Tint::Strong, terminal.colour) + change.text() + "\n";
-  text += "\n" + differences_table(diffed, terminal, all) + "\n";
-  const std::string found = findings(diffed, terminal);
-  text += found.empty() ? "no figure differs significantly" +
-                              (diffed.options.tolerance > 0 ? fmt::format(" and {:g} %", 100 * diffed.options.tolerance)
-                                                            : std::string()) +
-                              "\n"
-                        : found;
+  text += "\n" + differences_table(diffed, terminal, all) + "\n" + findings(diffed, terminal);
   text += fmt::format(
-      "* significant{}\n{} tests; false discovery rate 5 %; 95 % intervals from blocks of time;\nmax is not tested\n"
-      "times: of a task, finish - release; of a DAG with one sink, end to end\n"
-      "shares: of the jobs of that side\n",
+      "* significant{}; {} tests; false discovery rate 5 %; 95 % intervals from blocks of time; max is not tested; "
+      "times: of a task, finish - release; of a DAG with one sink, end to end; shares: of the jobs of that side\n",
       diffed.options.tolerance > 0
           ? fmt::format(", and for response times by more than {:g} %", 100 * diffed.options.tolerance)
           : "",

@@ -250,9 +250,8 @@ std::string describe(const Sensitivity &sensitivity, const StreamTraits &termina
   std::uint64_t tests = 0;
   for (const KnobResult &result : sensitivity.results) tests += result.margin.tested;
   text += fmt::format(
-      "\nlimit: the value with the largest load at which all deadlines are shown to be met,\n"
-      "as in every test with less load; rounded to four digits towards less load\n"
-      "(--json has every nanosecond)\n"
+      "\nlimit: the value with the largest load at which all deadlines are shown to be met, as in every test with "
+      "less load; rounded to four digits towards less load (--json has every nanosecond)\n"
       "factor: load at the limit / present load, rounded down\n"
       "{} analyses\n",
       format_count(tests));

@@ -255,7 +255,7 @@ std::string in_words(const Tuning &tuning) {
   }
   if (!tuned.varies) {
     text +=
-        "runs with different seeds are equal, because execution times and jitter do not vary:\nno validation is "
+        "runs with different seeds are equal, because execution times and jitter do not vary: no validation is "
         "needed\n";
   }
   if (!tuned.exhaustive) {
@@ -274,8 +274,7 @@ std::string describe(const Tuning &tuning, const StreamTraits &terminal, bool al
                                  objective_name(options.goal.objective),
                                  options.goal.per_criticality ? ", the most critical DAGs first" : "");
   text += fmt::format(
-      "simulated {} with {}; validated on {} unseen seed{};\n"
-      "{}\n"
+      "simulated {} with {}; validated on {} unseen seed{}; {}\n"
       "\n",
       humanize_duration(options.simulation.duration),
       options.seeds == 1 ? std::string("one seed") : fmt::format("each of {} seeds", options.seeds), options.held_out,

@@ -166,7 +166,7 @@ std::string describe(const Factorial &factorial, const FactorialResults &results
   if (results.done > 0) {
     if (results.rows.size() <= kMostRowsShown) {
       heading(
-          "Missed deadlines: late, skipped or aborted jobs, of all releases (medians with\nconfidence intervals)\n"
+          "Missed deadlines: late, skipped or aborted jobs, of all releases (medians with confidence intervals)\n"
           "max lateness: of all runs");
       text += combination_table(factorial, results, traits);
     } else {

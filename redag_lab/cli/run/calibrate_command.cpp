@@ -125,7 +125,6 @@ int calibrate(const CalibrateOptions &options, Console &console) {
   calibration.host = now.host;
   calibration.kernel = now.kernel;
   calibration.version = now.version;
-  if (!calibration.complete) console.warn("interrupted: the calibration is incomplete");
   if (!calibration.realtime) {
     console.warn(
         "this process may not use SCHED_FIFO: only ordinary threads were measured, as preemption 'cooperative' and "
@@ -135,6 +134,12 @@ int calibrate(const CalibrateOptions &options, Console &console) {
     console.print(to_text(calibration_json(calibration)));
   } else {
     console.say(describe(calibration, console.out_traits()));
+  }
+  if (!calibration.complete) {
+    console.error(
+        fmt::format("interrupted: {} is not written, as longer measurements can find larger values", options.out),
+        "let it finish, or choose a shorter --duration");
+    return kExitBad;
   }
   if (const Result<void> written = write_text(options.out, to_yaml(calibration)); !written) {
     console.note(written.error());

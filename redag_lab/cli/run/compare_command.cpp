@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <memory>
 
+#include "redag/model/waits.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag_lab/cli/run/comparison_report.hpp"
 #include "redag_lab/cli/run/run_arguments.hpp"
@@ -28,6 +29,21 @@ struct CompareOptions {
   std::uint32_t repeat = 0;  // 0: not given
   bool simulate = false;
 };
+
+// Returns false after naming the executors that keep a worker while a callback waits, if some callback does.
+bool know_waits(const CompareOptions &options, const std::vector<lab::Variant> &variants, const Workload &workload,
+                Console &console) {
+  std::vector<std::string> lacking;
+  for (const lab::Variant &variant : variants) {
+    if (!variant.is_redag()) lacking.push_back(variant.name);
+  }
+  if (lacking.empty() || !has_waits(workload)) return true;
+  if (options.run.file != "-") (void)load_configured(options.run, console);  // names each such task with its line
+  console.error(
+      fmt::format("--executors: segments cannot be simulated for {}", fmt::join(lacking, ", ")),
+      "they can for redag, redag-none, redag-cooperative and redag-os; or state 'wcet:' in place of 'segments:'");
+  return false;
+}
 
 class Comparing {
  public:
@@ -219,8 +235,8 @@ int compare(const CompareOptions &options, Console &console) {
     return kExitBad;
   }
   const std::uint32_t repetitions = options.repeat > 0 ? options.repeat : (options.simulate ? 1 : kThreadsRepetitions);
-  const std::optional<Workload> workload = load_configured(options.run, console);
-  if (!workload) return kExitBad;
+  const std::optional<Workload> workload = load_configured(options.run, console, {.waits = true});
+  if (!workload || !know_waits(options, *variants, *workload, console)) return kExitBad;
   if (!takes_arguments(*variants, options.run, console)) return kExitBad;
   if (options.simulate && options.run.seed + (repetitions - 1) < options.run.seed) {
     console.error("--seed and --repeat: the last seed is not below 2^64", "choose a smaller first seed");

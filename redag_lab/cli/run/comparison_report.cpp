@@ -107,11 +107,8 @@ std::string legend(const lab::Comparison &comparison, std::size_t repetitions) {
   const bool several = std::any_of(comparison.executors.front().repetitions.front().begin(),
                                    comparison.executors.front().repetitions.front().end(),
                                    [](const metrics::DagSummary &seen) { return seen.end_to_end.sinks.size() > 1; });
-  if (several)
-    text +=
-        ";\n"
-        "with several sinks, each figure is that of the worst one";
-  if (repetitions > 1) text += ";\nmax is the largest of all repetitions; p50 to p99 are medians over repetitions";
+  if (several) text += "; with several sinks, each figure is that of the worst one";
+  if (repetitions > 1) text += "; max is the largest of all repetitions; p50 to p99 are medians over repetitions";
   return text + "\n\n";
 }
 

@@ -16,6 +16,7 @@
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/output_file.hpp"
 #include "redag_analysis/metrics/jobs_csv.hpp"
+#include "redag_lab/cli/run/recorded_runs.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/files.hpp"
 #include "redag_lab/cli/terminal/options.hpp"
@@ -147,13 +148,15 @@ Result<void> check_place(const EventsOptions &options) {
 
 Result<void> convert(const EventsOptions &options, Console &console) {
   if (Result<void> place = check_place(options); !place) return place;
-  const Result<std::string> file = find_trace(options.place);
-  if (!file) return tl::unexpected<Diagnostics>(file.error());
-  Result<trace::EventsReader> reader = trace::EventsReader::open(*file);
+  const Result<ChosenRun> chosen = choose_run(options.place);
+  if (!chosen) return tl::unexpected<Diagnostics>(chosen.error());
+  console.note(chosen->note);
+  Result<trace::EventsReader> reader = trace::EventsReader::open(chosen->file);
   if (!reader) return tl::unexpected<Diagnostics>(std::move(reader.error()));
   const InterruptGuard guard;
   if (options.format == Format::Perfetto) {
-    const Result<std::optional<metrics::KernelRecord>> kernel = metrics::KernelRecord::beside(*file, reader->info());
+    const Result<std::optional<metrics::KernelRecord>> kernel =
+        metrics::KernelRecord::beside(chosen->file, reader->info());
     if (!kernel) return tl::unexpected<Diagnostics>(kernel.error());
     return lab::draw_picture(*reader, options.output, *kernel, InterruptGuard::interrupted);
   }

@@ -3,7 +3,10 @@
 
 #include "redag_lab/cli/run/recorded_runs.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cstdint>
 #include <filesystem>
 #include <set>
 #include <system_error>
@@ -80,6 +83,16 @@ std::size_t place_in(const std::vector<std::string> &order, const fs::path &subj
   return static_cast<std::size_t>(std::find(order.begin(), order.end(), subject.filename().string()) - order.begin());
 }
 
+// Returns how many deadlines a run missed, as its summary.json says; 0 without one.
+std::uint64_t missed_in(const std::string &trace) {
+  const Result<std::string> text = trace::read_file((fs::path(trace).parent_path() / "summary.json").string());
+  if (!text || json_nests_deeper(*text)) return 0;
+  const Json json = Json::parse(*text, nullptr, false);
+  if (!json.is_object() || !json.contains("total") || !json["total"].is_object()) return 0;
+  const Json missed = json["total"].value("missed", Json());
+  return missed.is_number_unsigned() ? missed.get<std::uint64_t>() : 0;
+}
+
 }  // namespace
 
 std::size_t RecordedPlaces::traces() const {
@@ -116,6 +129,31 @@ Result<RecordedPlaces> find_recorded_runs(const std::vector<std::string> &places
   const std::vector<std::string> labels = labels_of(subjects);
   for (std::size_t i = 0; i < labels.size(); ++i) found.runs[i].label = labels[i];
   return found;
+}
+
+Result<ChosenRun> choose_run(const std::string &place) {
+  const Result<RecordedPlaces> found = find_recorded_runs({place});
+  if (!found) return tl::unexpected<Diagnostics>(found.error());
+  const RecordedRuns &first = found->runs.front();
+  if (found->traces() == 1) return ChosenRun{first.traces.front(), {}};
+  const auto folder_of = [](const std::string &trace) { return fs::path(trace).parent_path().string(); };
+  std::error_code ignored;
+  if (found->runs.size() > 1 && !fs::exists(fs::path(place) / "comparison.json", ignored)) {
+    return make_error(fmt::format("{} holds {} runs", in_quotes(place), found->traces()),
+                      fmt::format("name one of them, such as {}", in_quotes(folder_of(first.traces.front()))));
+  }
+  std::size_t worst = 0;
+  std::uint64_t most = 0;
+  for (std::size_t i = 0; i < first.traces.size(); ++i) {
+    const std::uint64_t missed = missed_in(first.traces[i]);
+    if (missed <= most) continue;
+    worst = i;
+    most = missed;
+  }
+  const std::string why = most == 0 ? fmt::format("the first of {}: no repetition missed a deadline", first.label)
+                                    : fmt::format("in which {} missed most deadlines ({})", first.label, most);
+  return ChosenRun{first.traces[worst], fmt::format("{} holds {} runs; this is {}, {}\n", place, found->traces(),
+                                                    folder_of(first.traces[worst]), why)};
 }
 
 }  // namespace redag::cli

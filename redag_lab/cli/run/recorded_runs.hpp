@@ -28,4 +28,13 @@ struct RecordedPlaces {
 /// or a malformed comparison.json.
 [[nodiscard]] Result<RecordedPlaces> find_recorded_runs(const std::vector<std::string> &places);
 
+struct ChosenRun {
+  std::string file;  // its events
+  std::string note;  // which one it is, and why; empty: there is no other
+};
+
+/// Chooses one run. Of repetitions it is the one that missed most deadlines, and of a comparison one of the executor
+/// that it names first. Error: there is no run, or there are several of which none is meant more than the others.
+[[nodiscard]] Result<ChosenRun> choose_run(const std::string &place);
+
 }  // namespace redag::cli

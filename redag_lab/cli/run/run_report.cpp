@@ -124,9 +124,7 @@ std::string legend(const lab::Session &session) {
   const auto &dags = session.summary.dags;
   const bool several =
       std::any_of(dags.begin(), dags.end(), [](const auto &dag) { return dag.end_to_end.sinks.size() > 1; });
-  return text + (several ? ";\n"
-                           "with several sinks, each figure is that of the worst one\n"
-                         : "\n");
+  return text + (several ? "; with several sinks, each figure is that of the worst one\n" : "\n");
 }
 
 std::string verdict_line(const lab::Session &session, const StreamTraits &terminal) {

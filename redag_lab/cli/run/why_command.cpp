@@ -13,9 +13,9 @@
 #include "redag/base/nearest.hpp"
 #include "redag/base/text.hpp"
 #include "redag/trace/recording.hpp"
+#include "redag_lab/cli/run/recorded_runs.hpp"
 #include "redag_lab/cli/run/why_report.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
-#include "redag_lab/cli/terminal/files.hpp"
 
 namespace redag::cli {
 namespace {
@@ -46,11 +46,13 @@ class Explaining {
 
  private:
   Result<int> explain() {
-    const Result<std::string> file = find_trace(options_.place);
-    if (!file) return tl::unexpected<Diagnostics>(file.error());
-    const Result<trace::Recording> trace = trace::Recording::open(*file);
+    const Result<ChosenRun> chosen = choose_run(options_.place);
+    if (!chosen) return tl::unexpected<Diagnostics>(chosen.error());
+    console_.note(chosen->note);
+    const std::string &file = chosen->file;
+    const Result<trace::Recording> trace = trace::Recording::open(file);
     if (!trace) return tl::unexpected<Diagnostics>(trace.error());
-    const Result<std::optional<metrics::KernelRecord>> kernel = metrics::KernelRecord::beside(*file, trace->info());
+    const Result<std::optional<metrics::KernelRecord>> kernel = metrics::KernelRecord::beside(file, trace->info());
     if (!kernel) return tl::unexpected<Diagnostics>(kernel.error());
     if (trace->info().lost_events > 0) {
       console_.warn(fmt::format("{} events of this run were lost: explanations can be wrong",

@@ -32,7 +32,7 @@ TEST(Access, ATokenIsReadFromAFileThatFewMayRead) {
     std::ofstream(path) << content;
     EXPECT_EQ(::chmod(path.c_str(), mode), 0);
     const Result<std::string> token = read_token(path);
-    return token ? *token : token.error().to_string();
+    return token ? *token : to_string(token.error());
   };
   const std::string good(32, 'a');
   EXPECT_EQ(read(good + "\n", 0600), good);

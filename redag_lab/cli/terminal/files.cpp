@@ -70,7 +70,11 @@ Result<void> check_output(const std::string &path) {
 Result<std::vector<std::string>> find_traces(const std::string &place) {
   std::error_code error;
   if (!fs::exists(place, error)) return trace::file_error(place, 0, "no such file or folder");
-  if (!fs::is_directory(place, error)) return std::vector<std::string>{place};
+  if (!fs::is_directory(place, error)) {
+    if (!place.ends_with(".yaml") && !place.ends_with(".yml")) return std::vector<std::string>{place};
+    return trace::file_error(place, 0, "this is a workload, and not a recorded run",
+                             fmt::format("'redag simulate {} --out DIR' makes one", place));
+  }
   std::vector<std::string> files;
   fs::recursive_directory_iterator entry(place, error);
   for (const fs::recursive_directory_iterator end; !error && entry != end; entry.increment(error)) {
@@ -91,14 +95,6 @@ Result<std::vector<std::string>> find_traces(const std::string &place) {
   }
   std::sort(files.begin(), files.end());
   return files;
-}
-
-Result<std::string> find_trace(const std::string &place) {
-  Result<std::vector<std::string>> files = find_traces(place);
-  if (!files) return tl::unexpected<Diagnostics>(std::move(files.error()));
-  if (files->size() == 1) return files->front();
-  return make_error(fmt::format("{} holds {} runs", in_quotes(place), files->size()),
-                    fmt::format("name one of them, such as {}", in_quotes(files->front())));
 }
 
 std::string flight_folder(const std::string &folder) { return folder + "/" + kFlightName; }

@@ -31,9 +31,6 @@ namespace redag::cli {
 /// below. Error: none found.
 [[nodiscard]] Result<std::vector<std::string>> find_traces(const std::string &place);
 
-/// The same for a place that must hold one trace.
-[[nodiscard]] Result<std::string> find_trace(const std::string &place);
-
 /// True if a command writes a file or folder of this name into a result folder.
 [[nodiscard]] bool is_result_name(std::string_view name);
 

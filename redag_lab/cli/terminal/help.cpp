@@ -15,15 +15,16 @@
 namespace redag::cli {
 namespace {
 
-constexpr std::size_t kWidth = 80;
-constexpr std::size_t kTextColumn = 28;  // where descriptions of options begin
+constexpr std::size_t kMostWidth = 80;
+constexpr std::size_t kNarrow = 60;  // descriptions of options stand below them
 
 // Returns a row: a name, and its description beside or below it.
-std::string row(const std::string &name, const std::string &description) {
+std::string row(const std::string &name, const std::string &description, std::size_t width) {
+  const std::size_t column = width < kNarrow ? 6 : 28;  // where descriptions begin
   std::string text = "  " + name;
-  if (text.size() + 2 > kTextColumn) text += "\n";
+  if (text.size() + 2 > column) text += "\n";
   const std::size_t begin = text.back() == '\n' ? 0 : text.size();
-  return text + std::string(kTextColumn - begin, ' ') + wrapped(description, kTextColumn, kWidth);
+  return text + std::string(column - begin, ' ') + wrapped(description, column, width);
 }
 
 std::string names_of(const CLI::Option &option) {
@@ -53,11 +54,9 @@ std::string remarks_on(const CLI::Option &option) {
   return remarks.empty() ? std::string() : fmt::format(" ({})", fmt::join(remarks, "; "));
 }
 
-std::string row(const CLI::Option &option) { return row(label_of(option), description_of(option)); }
-
-std::string section(const std::string &title, const std::vector<const CLI::Option *> &options) {
+std::string section(const std::string &title, const std::vector<const CLI::Option *> &options, std::size_t width) {
   std::string text;
-  for (const CLI::Option *option : options) text += row(*option);
+  for (const CLI::Option *option : options) text += row(label_of(*option), description_of(*option), width);
   return text.empty() ? text : "\n" + title + ":\n" + text;
 }
 
@@ -84,21 +83,30 @@ std::string label_of(const CLI::Option &option) {
 
 std::string description_of(const CLI::Option &option) { return option.get_description() + remarks_on(option); }
 
+HelpFormatter::HelpFormatter(std::size_t width) : width_(width == 0 ? kMostWidth : std::min(width, kMostWidth)) {
+  label("SUBCOMMAND", "COMMAND");
+}
+
 std::string HelpFormatter::make_help(const CLI::App *app, std::string name, CLI::AppFormatMode /*mode*/) const {
-  std::string text = wrapped(app->get_description(), 0, kWidth) + "\n" + make_usage(app, name);
-  text += section("Arguments", app->get_options([](const CLI::Option *option) { return option->get_positional(); }));
+  std::string text = wrapped(app->get_description(), 0, width_) + "\n" + make_usage(app, name);
+  text += section("Arguments", app->get_options([](const CLI::Option *option) { return option->get_positional(); }),
+                  width_);
   for (const std::string &group : app->get_groups()) {
     if (group.empty()) continue;  // hidden options
-    text += section(group, app->get_options([&](const CLI::Option *option) {
+    const auto belongs = [&](const CLI::Option *option) {
       return option->get_group() == group && option->nonpositional();
-    }));
+    };
+    text += section(group, app->get_options(belongs), width_);
   }
   std::string commands;
   for (const CLI::App *command : app->get_subcommands({}))
-    commands += row(command->get_name(), command->get_description());
+    commands += row(command->get_name(), command->get_description(), width_);
   if (!commands.empty()) text += "\nCommands:\n" + commands;
+  // Commands of examples are copied, and stay on their lines.
   const std::string footer = app->get_footer();
-  return text + "\n" + footer + (footer.empty() || footer.back() == '\n' ? "" : "\n");
+  const bool is_prose = footer.rfind("Examples:", 0) != 0;
+  return text + "\n" + (is_prose ? fitted(footer, width_) : footer) +
+         (footer.empty() || footer.back() == '\n' ? "" : "\n");
 }
 
 }  // namespace redag::cli

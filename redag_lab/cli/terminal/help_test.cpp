@@ -64,6 +64,29 @@ TEST(Help, ChoicesAreInTheTypeNameAndNotShown) {
   EXPECT_TRUE(value_type(*option).choices.empty());
 }
 
+TEST(Help, FitsANarrowTerminal) {
+  CLI::App app("Does something that takes more words than a narrow terminal has room for.", "prog");
+  app.formatter(std::make_shared<HelpFormatter>(40));
+  std::string file;
+  app.add_option("--file", file, "A file, described in so many words that they wrap")->type_name("FILE");
+  app.footer("Exit status: 0 success; 1 negative result, such as a missed deadline.");
+  EXPECT_EQ(app.help(), R"(Does something that takes more words
+than a narrow terminal has room for.
+
+Usage: prog [OPTIONS]
+
+Options:
+  -h, --help
+      Print this help message and exit
+  --file FILE
+      A file, described in so many words
+      that they wrap
+
+Exit status: 0 success; 1 negative
+  result, such as a missed deadline.
+)");
+}
+
 TEST(Help, LeavesLongWordsWhole) {
   CLI::App app(std::string(100, 'x') + " y", "prog");
   app.formatter(std::make_shared<HelpFormatter>());

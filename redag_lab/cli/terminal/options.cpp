@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
@@ -73,6 +74,20 @@ CLI::Option *add_duration(CLI::App &app, const std::string &name, std::optional<
 CLI::Option *add_duration(CLI::App &app, const std::string &name, Duration &target, const std::string &help,
                           bool zero_allowed) {
   return add_duration_to(app, name, target, help, zero_allowed)->default_str(format_duration(target));
+}
+
+std::string taken_for_value(const CLI::App &command) {
+  constexpr std::array<std::string_view, 5> kFiles = {"FILE", "DIR", "RESULT", "WORKLOAD", "ROBOT"};
+  for (const CLI::Option *option : command.get_options()) {
+    if (option->get_positional() || option->get_type_size() == 0) continue;
+    if (std::find(kFiles.begin(), kFiles.end(), value_type(*option).name) != kFiles.end()) continue;
+    for (const std::string &value : option->results()) {
+      std::error_code ignored;
+      if (!std::filesystem::is_regular_file(value, ignored)) continue;
+      return fmt::format(", and {} has taken {} as its value", option->get_name(), in_quotes(value));
+    }
+  }
+  return {};
 }
 
 CLI::Option &option_named(CLI::App &app, std::string_view name) {

@@ -60,6 +60,10 @@ inline constexpr std::uint64_t kMaxEvents = 1'000'000'000;
 /// when memory runs out: it compares names in a noexcept function.
 CLI::Option &option_named(CLI::App &app, std::string_view name);
 
+/// Returns ", and --explain has taken 'FILE' as its value" if an option of the command has an existing file for a value
+/// that is none; empty otherwise. For messages about a missing FILE.
+[[nodiscard]] std::string taken_for_value(const CLI::App &command);
+
 /// Adds a whole number; the help shows its default.
 CLI::Option *add_count(CLI::App &app, const std::string &name, std::uint32_t &target, Range<std::uint32_t> range,
                        const std::string &help);

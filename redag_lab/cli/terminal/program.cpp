@@ -198,19 +198,29 @@ std::string help_prefix(const CLI::App &command) {
   return outer.empty() ? "redag" : "redag " + outer;
 }
 
-int parse_and_run(const std::vector<std::string> &arguments, Console &console) {
+// Returns the arguments with "help COMMAND" as "COMMAND --help", and "version" as "--version".
+std::vector<std::string> as_options(std::vector<std::string> arguments) {
+  if (arguments.empty()) return arguments;
+  if (arguments.front() == "version") arguments.front() = "--version";
+  if (arguments.front() != "help") return arguments;
+  arguments.erase(arguments.begin());
+  arguments.emplace_back("--help");
+  return arguments;
+}
+
+int parse_and_run(const std::vector<std::string> &given, Console &console) {
+  const std::vector<std::string> arguments = as_options(given);
   CLI::App app(
       "ReDAG-RT schedules many DAGs of callbacks by priority in one process. This program validates, simulates, runs, "
       "compares and analyses workloads.",
       "redag");
-  app.set_version_flag("--version", fmt::format("redag {} (revision {})", kVersion, build_revision()));
+  app.set_version_flag("-V,--version", fmt::format("redag {} (revision {})", kVersion, build_revision()));
   app.require_subcommand(0, 1);
   app.option_defaults()->disable_flag_override();
-  app.formatter(std::make_shared<HelpFormatter>());
+  app.formatter(std::make_shared<HelpFormatter>(console.out_traits().width));
   app.footer(
-      "Run 'redag COMMAND --help' for the options of a command, with examples.\n\n"
-      "Exit status: 0 success; 1 negative result, such as a missed deadline with\n"
-      "--check; 2 bad input or usage.");
+      "Run 'redag help COMMAND' for the options of a command, with examples.\n\n"
+      "Exit status: 0 success; 1 negative result, such as a missed deadline with --check; 2 bad input or usage.");
   std::vector<std::pair<CLI::App *, Action>> actions;
   for (const Entry &entry : kCommands) {
     CLI::App *command = app.add_subcommand(entry.name, entry.summary);
@@ -250,8 +260,11 @@ int parse_and_run(const std::vector<std::string> &arguments, Console &console) {
     CLI::App *command = chosen(app);
     const std::string said = error.what();
     const bool lacks_command = said == "A subcommand is required";
-    return usage_error(console, lacks_command ? "a command is missing after 'redag " + name_of(command) + "'" : said,
-                       name_of(command));
+    if (lacks_command) {
+      return usage_error(console, "a command is missing after 'redag " + name_of(command) + "'", name_of(command));
+    }
+    const bool lacks_file = command != nullptr && said.ends_with(" is required");
+    return usage_error(console, said + (lacks_file ? taken_for_value(*command) : ""), name_of(command));
   }
   if (const CLI::App *command = chosen(app); command != nullptr) {
     if (const std::string option = find_empty(*command); !option.empty()) {

@@ -15,10 +15,9 @@ namespace redag::cli {
 namespace {
 
 constexpr Duration kRedrawPeriod = 100 * kMillisecond;
-constexpr Duration kLinePeriod = 5 * kSecond;
 constexpr std::size_t kBarWidth = 20;
 
-// Beyond a day, seconds are of no interest, and a first estimate can be far off.
+// A first estimate can be far off, and beyond what a Duration holds.
 std::string rest_in_words(double rest) {
   return (rest < 86'400e9 ? humanize_duration(static_cast<Duration>(rest)) : "more than a day") + " left";
 }
@@ -51,21 +50,12 @@ std::string pace(std::uint64_t done, std::uint64_t total, Duration elapsed) {
   return text + fmt::format(", {:.0f}/s, {}", 1e9 / each, rest_in_words(rest));
 }
 
-Progress::Progress(Console &console)
-    : console_(console), begin_(now()), last_drawn_(console.err_traits().terminal ? 0 : begin_) {}
+Progress::Progress(Console &console) : console_(console), begin_(now()) {}
 
-bool Progress::due() const {
-  return now() - last_drawn_ >= (console_.err_traits().terminal ? kRedrawPeriod : kLinePeriod);
-}
+bool Progress::due() const { return console_.err_traits().terminal && now() - last_drawn_ >= kRedrawPeriod; }
 
 void Progress::draw(double done, std::string_view detail) {
-  if (!console_.err_traits().terminal) {
-    if (!due()) return;
-    last_drawn_ = now();
-    console_.note(fmt::format("{}{}{:.0f} %, {}\n", label_, label_.empty() ? "" : ": ",
-                              100 * std::clamp(done, 0.0, 1.0), detail));
-    return;
-  }
+  if (!console_.err_traits().terminal) return;
   last_drawn_ = now();
   visible_ = true;
   // One column stays free, because a full last column wraps on some terminals.

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A line on standard error with the progress of a long command. On a terminal it is redrawn at most ten times a second
-// and finally erased. Elsewhere a plain line appears every five seconds. Not thread-safe.
+// A line on standard error with the progress of a long command, on a terminal only. It is redrawn at most ten times a
+// second and finally erased. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,7 @@ class Progress {
   /// Sets the text before the bar, such as "mte 2/3".
   void set_label(std::string label) { label_ = std::move(label); }
 
-  /// True if it is time to redraw. Reads a clock, but is cheap enough to call often.
+  /// True on a terminal, if it is time to redraw. Reads a clock, but is cheap enough to call often.
   [[nodiscard]] bool due() const;
 
   /// Draws the line. `done` is in [0, 1]; `detail` follows the bar, cut to the terminal.
@@ -41,7 +41,7 @@ class Progress {
   Console &console_;
   std::string label_;
   Time begin_;
-  Time last_drawn_;
+  Time last_drawn_ = 0;
   bool visible_ = false;
 };
 

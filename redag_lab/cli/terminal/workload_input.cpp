@@ -34,12 +34,9 @@ Result<std::string> read_standard_input() {
 
 }  // namespace
 
-Result<std::string> read_input_text(const std::string &path, const char *what) {
-  return path == "-" ? read_standard_input() : read_text_file(path, what, kMaxWorkloadBytes);
-}
-
 Result<robot::Input> load_workload_or_robot(const std::string &path, LoadOptions options, std::string *source) {
-  Result<std::string> text = read_input_text(path, "a workload file");
+  Result<std::string> text =
+      path == "-" ? read_standard_input() : read_text_file(path, "a workload file", kMaxWorkloadBytes);
   if (!text) return tl::unexpected<Diagnostics>(std::move(text.error()));
   const bool is_file = path != "-";
   Result<robot::Input> input = robot::parse_input(*text, is_file ? path : "<stdin>", options);

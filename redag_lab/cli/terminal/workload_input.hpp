@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Reads the input of a command that takes a workload, a robot, or another text of that size. Not thread-safe.
+// Reads the input of a command that takes a workload or a robot. Not thread-safe.
 #pragma once
 
 #include <string>
@@ -9,9 +9,6 @@
 #include "redag_lab/robot/input.hpp"
 
 namespace redag::cli {
-
-/// Returns the text of a file, or of standard input if `path` is "-". `what` names the kind of file in messages.
-[[nodiscard]] Result<std::string> read_input_text(const std::string &path, const char *what);
 
 /// Reads a file, or standard input if `path` is "-". Leaves its text in `source`, if that is given.
 [[nodiscard]] Result<robot::Input> load_workload_or_robot(const std::string &path, LoadOptions options = {},
