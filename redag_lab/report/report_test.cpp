@@ -237,7 +237,7 @@ TEST(Document, SaysWhatTheRunsWere) {
   EXPECT_EQ(redag["tasks"][0]["bound_ns"], 2'000'000);
   EXPECT_EQ(redag["total"]["released"], 120);
   EXPECT_EQ(redag["schedule"]["windows"][0]["slices"]["task"].size(), redag["schedule"]["slices_in_all"]);
-  EXPECT_EQ(document["headline"]["text"], "redag missed none of its deadlines and ste 40.0 %");
+  EXPECT_EQ(document["headline"]["text"], "redag missed none of its deadlines and ste 16.7 %");
   EXPECT_EQ(document["comparison"]["dags"].size(), 2U);
   EXPECT_EQ(document["comparison"]["dags"][0]["groups"][0]["missed"], 0);
   EXPECT_GT(document["comparison"]["dags"][0]["groups"][1]["missed"], 0);

@@ -77,13 +77,10 @@ await test('the first screen holds the verdict, one picture, and the worst misse
 await test('the schedule opens at the worst miss of the worst run, which a click on the first screen shows', async () => {
   const {page, problems, close} = await open('comparison', {viewport: {width: 1280, height: 900}});
   const {groups} = JSON.parse(await page.locator('#data').textContent());
-  for (const [g, {label, why, runs, worst_run: worst, schedule, run}] of groups.entries()) {
+  for (const [g, {label, why, runs, worst_run: worst, schedule}] of groups.entries()) {
     await page.getByRole('button', {name: label, exact: true}).click();
     assert.ok(runs[worst].missed === Math.max(...runs.map(({missed}) => missed)), label);
-    const [from, to] = await page.locator('figure[data-figure=schedule] .chart > div').evaluate((node) => {
-      const {startValue, endValue} = window.echarts.getInstanceByDom(node).getOption().dataZoom[0];
-      return [startValue, endValue];
-    });
+    const [from, to] = await page.locator('figure[data-figure=schedule]').evaluate(({dataset}) => [Number(dataset.from), Number(dataset.to)]);
     const released = why.worst.since[0];
     assert.ok(from <= released && released < to, `${label}: ${released} is not between ${from} and ${to}`);
     assert.deepEqual([schedule.views[0].task, schedule.views[0].job], [why.worst.task[0], why.worst.number[0]]);
@@ -104,19 +101,21 @@ await test('the schedule opens at the worst miss of the worst run, which a click
 await test('shares end at 100 %, and no number stands on the range of its repetitions', async () => {
   const {page, problems, close} = await open('comparison');
   const look = (name) => page.locator(`figure[data-figure=${name}] .chart`).evaluate((box) => {
-    const chart = window.echarts.getInstanceByDom(box.firstElementChild);
     const boxOf = (shape) => shape.getBoundingClientRect();
-    const numbers = [...box.querySelectorAll('svg text')].filter((text) => /\d\s?(%|\u00b5?[mn]?s)$/.test(text.textContent) && text.getAttribute('text-anchor') === 'middle').map(boxOf);
+    const texts = [...box.querySelectorAll('svg text')].filter((text) => /\d\s?(%|\u00b5?[mn]?s)$/.test(text.textContent));
+    const isTick = (text) => text.getAttribute('text-anchor') === 'end';
+    const numbers = texts.filter((text) => !isTick(text)).map(boxOf);
     const lines = [...box.querySelectorAll('svg path')].filter((shape) => shape.getAttribute('fill') === 'none').map(boxOf).filter(({width, height}) => width < 3 && height > 1 && height < 200);
     const meet = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom - 1 && b.top < a.bottom - 1;
-    return {most: chart.getOption().yAxis[0].max, kinds: [...new Set(chart.getOption().series.map(({type}) => type))], numbers: numbers.length,
-      overprinted: numbers.filter((number) => lines.some((line) => meet(number, line))).length};
+    const filled = [...box.querySelectorAll('svg path')].filter((shape) => !['none', 'transparent'].includes(shape.getAttribute('fill'))).map(boxOf);
+    return {ticks: texts.filter(isTick).map((text) => text.textContent), numbers: numbers.length,
+      bars: filled.filter(({width, height}) => height > 20 && width > 8 && width < 80).length, overprinted: numbers.filter((number) => lines.some((line) => meet(number, line))).length};
   });
   const missed = await look('missed');
-  assert.ok(missed.most <= 1, `the axis ends at ${missed.most}`);
-  assert.deepEqual(missed.kinds, ['bar', 'custom']);
+  assert.ok(missed.ticks.length > 2 && missed.ticks.every((tick) => parseFloat(tick) <= 100), missed.ticks.join(', '));
+  assert.ok(missed.bars >= 2);
   const p99 = await look('p99');
-  assert.deepEqual(p99.kinds, ['custom'], 'dots: a logarithmic axis has no zero for bars');
+  assert.equal(p99.bars, 0, 'dots: a logarithmic axis has no zero for bars');
   for (const {numbers, overprinted} of [missed, p99]) {
     assert.ok(numbers >= 9, `${numbers} numbers`);
     assert.equal(overprinted, 0);

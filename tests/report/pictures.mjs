@@ -14,7 +14,7 @@ import {chromium} from 'playwright-core';
 
 const [executablePath, scratch, redag, source, task] = process.argv.slice(2);
 const states = path.join(source, 'tests', 'report', 'live.json');
-const PICTURES = {report: [1280, 900], experiment_report: [1280, 900], serve: [1280, 1360]};
+const PICTURES = {report: [1280, 900], experiment_report: [1280, 900], serve: [1280, 1580]};
 const PAGES = {report: 'comparison', experiment_report: 'experiment'};
 const CELL = 16;          // pixels; a glyph is smaller
 const NEAR = 16;          // of 255, by which the mean colour of a cell may differ

@@ -108,6 +108,7 @@ function scheduleFigure(groups, state, explain) {
       const inTasks = state.rows === 'tasks';
       const clip = (params, shape) => echarts.clipRectByRect(shape, params.coordSys);
       if (zoom === null) zoom = firstLook(c);
+      Object.assign(fig.box.dataset, {from: zoom[0], to: zoom[1]});  // for tests: the canvas does not tell
       fig.resize(Math.max(160, 96 + ROW_HEIGHT * c.rows.length));
       const missed = (i) => c.slices.job[i] !== null && c.jobs.missed[c.slices.job[i]] === 1;
       return {
