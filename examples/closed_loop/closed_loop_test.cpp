@@ -194,6 +194,15 @@ TEST(VirtualTime, WhatMissesFallsAndWhatDoesNotStaysUp) {
   }
 }
 
+// The pictures of README.md (tools/pictures) show this.
+TEST(VirtualTime, InThePicturesAPlantFallsUnderMteAndNoneUnderRedag) {
+  RunSetup setup;
+  setup.seed = 13;
+  setup.duration = 8 * kSecond;
+  EXPECT_EQ(falls(run_in_virtual_time(robot(), executor_choice("redag"), setup)), 0U);
+  EXPECT_EQ(falls(run_in_virtual_time(robot(), executor_choice("mte"), setup)), 1U);
+}
+
 TEST(VirtualTime, SnapshotsDoNotDisturb) {
   RunSetup setup;
   setup.duration = kSecond;

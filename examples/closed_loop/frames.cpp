@@ -12,6 +12,7 @@
 #include <png.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <functional>
 #endif
@@ -42,6 +43,8 @@ constexpr int kWidth = 400;
 constexpr int kHeight = 300;
 constexpr int kGap = 4;
 constexpr std::size_t kBytes = 3;
+constexpr std::size_t kChannels = 4;                                    // of MuJoCo's colours
+constexpr std::array<float, kChannels> kDown = {0.85F, 0.1F, 0.1F, 1};  // the colour of a plant that has fallen
 
 struct Image {
   int width = 0;
@@ -73,7 +76,10 @@ struct Image {
 class Renderer {
  public:
   explicit Renderer(const std::vector<PlantSpec> &plants)
-      : model_(compile(mjcf(plants))), data_(mj_makeData(model_.get())), buffer_(std::size_t{4} * kWidth * kHeight) {
+      : model_(compile(mjcf(plants))),
+        data_(mj_makeData(model_.get())),
+        colours_(model_->geom_rgba, model_->geom_rgba + kChannels * static_cast<std::size_t>(model_->ngeom)),
+        buffer_(kChannels * kWidth * kHeight) {
     gl_ = OSMesaCreateContextExt(OSMESA_RGBA, 24, 8, 0, nullptr);
     if (gl_ == nullptr || OSMesaMakeCurrent(gl_, buffer_.data(), GL_UNSIGNED_BYTE, kWidth, kHeight) == 0) {
       throw std::runtime_error("OSMesa gives no context to draw in");
@@ -109,6 +115,7 @@ class Renderer {
       data_->qpos[q++] = snapshots[i].angle;
     }
     mj_forward(model_.get(), data_.get());
+    paint(snapshots);
     const mjrRect view{0, 0, kWidth, kHeight};
     mjv_updateScene(model_.get(), data_.get(), &option_, nullptr, &camera_, mjCAT_ALL, &scene_);
     mjr_render(view, &scene_, &context_);
@@ -125,8 +132,24 @@ class Renderer {
   }
 
  private:
+  // Every plant hangs on one child of the world, in the order of the plants.
+  void paint(const std::vector<Snapshot> &snapshots) {
+    std::copy(colours_.begin(), colours_.end(), model_->geom_rgba);
+    int root = 0;
+    auto plant = snapshots.begin() - 1;
+    for (int geom = 0; geom < model_->ngeom; ++geom) {
+      const int owner = model_->body_rootid[model_->geom_bodyid[geom]];
+      if (owner == 0) continue;  // the floor and the rails
+      if (owner != root) ++plant;
+      root = owner;
+      if (plant->down)
+        std::copy(kDown.begin(), kDown.end(), model_->geom_rgba + kChannels * static_cast<std::size_t>(geom));
+    }
+  }
+
   Model model_;
   Data data_;
+  std::vector<float> colours_;  // of all plants upright
   std::vector<unsigned char> buffer_;
   OSMesaContext gl_ = nullptr;
   mjvScene scene_{};
@@ -144,9 +167,12 @@ Snapshot at(const std::vector<Snapshot> &snapshots, Time time) {
 
 Image frame(Renderer &renderer, const std::vector<PlantSpec> &specs, const Recorded &run, Time time) {
   std::vector<Snapshot> snapshots;
-  for (const PlantResult &plant : run.plants) snapshots.push_back(at(plant.snapshots, time));
-  return renderer.draw(specs, snapshots, run.executor,
-                       fmt::format("{:.2f} s", static_cast<double>(time) / redag::kSecond));
+  std::string text = fmt::format("{:.2f} s", static_cast<double>(time) / redag::kSecond);
+  for (const PlantResult &plant : run.plants) {
+    snapshots.push_back(at(plant.snapshots, time));
+    if (snapshots.back().down) text += fmt::format("\n{} fell", plant.plant);
+  }
+  return renderer.draw(specs, snapshots, run.executor, text);
 }
 
 // Returns `columns` by `rows` scenes side by side.

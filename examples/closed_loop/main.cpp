@@ -173,10 +173,10 @@ std::vector<Time> moments(Time fall) {
   return times;
 }
 
-// Returns the instants of a movie that ends a little after the fall.
+// Returns the instants of a movie with the fall in its middle.
 std::vector<Time> instants(Time fall, Duration length) {
-  const Time end = fall + length / 4;
   std::vector<Time> times;
+  const Time end = fall + length / 2;
   for (Time time = std::max<Time>(0, end - length); time < end; time += kMovieFrame) times.push_back(time);
   return times;
 }

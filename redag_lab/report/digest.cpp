@@ -41,14 +41,23 @@ Result<void> Group::add(const std::string &path, const trace::Recording &run,
   REDAG_CHECK(fits(run.info()), "jobs of different runs counted together");
   const bool is_first = runs_.empty();
   if (is_first) begin(run.info());
-  Result<RunDigest> digest = read(path, run);
+  Timeline timeline;
+  Result<RunDigest> digest = read(path, run, timeline);
   if (!digest) return tl::unexpected<Diagnostics>(std::move(digest.error()));
-  if (is_first) {
-    Result<Schedule> schedule = schedule_of(run, options_.most_slices, options_.most_views);
+  const Result<metrics::Investigation> investigation = metrics::Investigation::of(run, kernel, options_.most_explained);
+  if (!investigation) return tl::unexpected<Diagnostics>(investigation.error());
+  if (is_worst(*investigation)) {
+    const std::vector<metrics::Subject> closest = investigation->closest(1);
+    const std::vector<metrics::Subject> &worst = investigation->misses().empty() ? closest : investigation->misses();
+    Result<Schedule> schedule = schedule_of(run, options_.most_slices, options_.most_views,
+                                            worst.empty() ? std::nullopt : std::optional(worst.front().job));
     if (!schedule) return tl::unexpected<Diagnostics>(std::move(schedule.error()));
-    schedule_ = *std::move(schedule);
-    Result<WhyDigest> why = why_of(run, kernel, schedule_, options_.most_explained);
+    Result<WhyDigest> why = why_of(*investigation, *schedule);
     if (!why) return tl::unexpected<Diagnostics>(std::move(why.error()));
+    worst_run_ = runs_.size();
+    most_missed_ = investigation->missed();
+    timeline_ = std::move(timeline);
+    schedule_ = *std::move(schedule);
     why_ = *std::move(why);
   }
   const auto bound_of = [this](TaskId task) {
@@ -65,6 +74,11 @@ Result<void> Group::add(const std::string &path, const trace::Recording &run,
   return {};
 }
 
+bool Group::is_worst(const metrics::Investigation &investigation) const {
+  if (runs_.empty() || investigation.missed() > most_missed_) return true;
+  return investigation.missed() == most_missed_ && latest_ && latest_->run == runs_.size();
+}
+
 void Group::begin(const trace::RunInfo &info) {
   const std::size_t tasks = info.workload.task_count();
   is_sink_ = metrics::sinks_of(info.workload);
@@ -75,22 +89,22 @@ void Group::begin(const trace::RunInfo &info) {
 }
 
 // Counts all that one pass over the events can count.
-Result<RunDigest> Group::read(const std::string &path, const trace::Recording &run) {
+Result<RunDigest> Group::read(const std::string &path, const trace::Recording &run, Timeline &timeline) {
   const trace::RunInfo &info = run.info();
   metrics::Summarizer summarizer(info, options_.exact_jobs);
   metrics::TraceChecker checker(info, metrics::rules_for(info));
   metrics::JobFolder jobs(info.workload);
   SliceFolder slices(info);
   ServiceFolder services(info);
-  TimelineBuilder timeline(info, options_.most_bins);
-  const auto draw = [&timeline](const auto &one) { timeline.add(one); };
+  TimelineBuilder builder(info, options_.most_bins);
+  const auto draw = [&builder](const auto &one) { builder.add(one); };
   const Result<void> visited = run.visit([&](std::span<const JobEvent> events) {
     summarizer.add(events);
     if (info.lost_events == 0) checker.add(events);
     jobs.add(events);
     jobs.drain_ended([&](const JobRecord &job) {
-      take(path, info, job);
-      timeline.add(job);
+      take(info, job);
+      builder.add(job);
     });
     slices.add(events);
     slices.drain(draw);
@@ -98,16 +112,16 @@ Result<RunDigest> Group::read(const std::string &path, const trace::Recording &r
     services.drain(draw);
   });
   if (!visited) return tl::unexpected<Diagnostics>(visited.error());
-  for (const JobRecord &job : jobs.in_flight()) timeline.add(job);
+  for (const JobRecord &job : jobs.in_flight()) builder.add(job);
   slices.finish();
   slices.drain(draw);
   services.finish();
   services.drain(draw);
-  if (runs_.empty()) timeline_ = timeline.take();
+  timeline = builder.take();
   return RunDigest{path, info, summarizer.finish(info.end), checker.finish(info.end, info.lost_events)};
 }
 
-void Group::take(const std::string &path, const trace::RunInfo &info, const JobRecord &job) {
+void Group::take(const trace::RunInfo &info, const JobRecord &job) {
   if (job.release < info.start + info.warm_up || job.outcome != JobOutcome::Finished) return;
   Samples &samples = samples_[job.task.value];
   responses_[job.task.value].add(job.response());
@@ -120,7 +134,7 @@ void Group::take(const std::string &path, const trace::RunInfo &info, const JobR
   const bool is_first_of_equals =
       latest_ && lateness == most && latest_->run == runs_.size() && job.sequence < latest_->record.sequence;
   if (!latest_ || lateness > most || is_first_of_equals) {
-    latest_ = LatestJob{job, path, job.release - info.start, runs_.size()};
+    latest_ = LatestJob{job, runs_.size()};
   }
 }
 

@@ -52,8 +52,6 @@ struct RunDigest {
 /// The job with the largest lateness relative to its deadline.
 struct LatestJob {
   metrics::JobRecord record;
-  std::string path;     // folder of its run
-  Time since = 0;       // its release, from the start of the run
   std::size_t run = 0;  // the number of its run in the group
 };
 
@@ -62,7 +60,7 @@ class Group {
   /// Starts without runs. Call add() before any other function.
   Group(std::string label, const DigestOptions &options) : label_(std::move(label)), options_(options) {}
 
-  /// Adds a run. The first run provides the schedule, the timeline and the explanations, for which `kernel` is the
+  /// Adds a run. The worst run provides the schedule, the timeline and the explanations, for which `kernel` is the
   /// kernel's record of it, if there is one. Requires fits(run.info()). Error: a damaged file; the group is then of no
   /// further use.
   [[nodiscard]] Result<void> add(const std::string &path, const trace::Recording &run,
@@ -78,6 +76,9 @@ class Group {
   [[nodiscard]] const trace::RunInfo &info() const { return runs_.front().info; }
   [[nodiscard]] const Workload &workload() const { return info().workload; }
   [[nodiscard]] const RunBounds &bounds() const { return bounds_; }
+  /// The position of the run with most misses, or without any the job closest to its deadline. schedule(), timeline()
+  /// and why() are of it.
+  [[nodiscard]] std::size_t worst_run() const { return worst_run_; }
   [[nodiscard]] const Schedule &schedule() const { return schedule_; }
   [[nodiscard]] const WhyDigest &why() const { return why_; }
   [[nodiscard]] const Timeline &timeline() const { return timeline_; }
@@ -96,8 +97,9 @@ class Group {
  private:
   [[nodiscard]] metrics::DagSummary pooled(DagId dag);
   void begin(const trace::RunInfo &info);
-  [[nodiscard]] Result<RunDigest> read(const std::string &path, const trace::Recording &run);
-  void take(const std::string &path, const trace::RunInfo &info, const metrics::JobRecord &job);
+  [[nodiscard]] Result<RunDigest> read(const std::string &path, const trace::Recording &run, Timeline &timeline);
+  [[nodiscard]] bool is_worst(const metrics::Investigation &investigation) const;
+  void take(const trace::RunInfo &info, const metrics::JobRecord &job);
 
   std::string label_;
   DigestOptions options_;
@@ -108,6 +110,8 @@ class Group {
   std::vector<metrics::DurationSketch> end_to_end_;  // by TaskId: f - origin, of sinks
   std::optional<LatestJob> latest_;
   RunBounds bounds_;
+  std::size_t worst_run_ = 0;
+  std::uint64_t most_missed_ = 0;  // jobs of that run
   Schedule schedule_;
   WhyDigest why_;
   Timeline timeline_;

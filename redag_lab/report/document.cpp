@@ -131,10 +131,12 @@ Json to_json(const Schedule &schedule, const trace::RunInfo &run) {
   Json views = Json::array();
   for (const View &view : schedule.views) {
     Json row{{"window", view.window}, {"begin_ns", view.begin}, {"end_ns", view.end}};
-    if (view.task.valid()) {
-      row["task"] = view.task.value;
-      row["job"] = view.job;
-      row["lateness_ns"] = view.lateness;
+    if (view.job) {
+      const JobRecord &job = *view.job;
+      row["task"] = job.task.value;
+      row["job"] = job.number;
+      row["missed"] = metrics::miss_of(job, run.end, end_to_end[job.task.value]) != metrics::Miss::None;
+      row["lateness_ns"] = job.outcome == metrics::JobOutcome::Finished ? Json(job.lateness()) : Json();
     }
     views.push_back(std::move(row));
   }
@@ -207,14 +209,9 @@ class GroupWriter {
     const Schedule &schedule = group.schedule();
     if (schedule.slices_shown < schedule.slices_in_all) {
       cuts.push_back(
-          fmt::format("{}: the schedule shows {} of {} slices on workers: the beginning, and the time around the worst "
-                      "jobs; the overview covers the whole run",
+          fmt::format("{}: the schedule shows {} of {} slices on workers: the time around the worst jobs, and the "
+                      "beginning; the overview covers the whole run",
                       group.label(), format_count(schedule.slices_shown), format_count(schedule.slices_in_all)));
-    }
-    if (group.runs().size() > 1) {
-      cuts.push_back(fmt::format(
-          "{}: the schedule and the explanations are of the first of {} runs; all other figures cover all runs",
-          group.label(), group.runs().size()));
     }
   }
 
@@ -239,6 +236,7 @@ class GroupWriter {
                   {"by", bounds.by},
                   {"assumes", bounds.assumes}}},
                 {"runs", std::move(runs)},
+                {"worst_run", group_.worst_run()},
                 {"timeline", to_json(group_.timeline())},
                 {"schedule", to_json(group_.schedule(), group_.info())},
                 {"why", Json::parse(report::to_json(group_.why(), group_.workload()))}};

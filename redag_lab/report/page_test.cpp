@@ -6,6 +6,8 @@
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
+#include <regex>
+#include <set>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -72,6 +74,35 @@ TEST(Page, AssetsAreWholeAndCannotEndTheirElements) {
     EXPECT_EQ(asset.find("<!--"), std::string_view::npos);
     EXPECT_EQ(asset.find("</style"), std::string_view::npos);
   }
+}
+
+// Returns what the first group of `pattern` matches in a text.
+std::set<std::string> matches(std::string_view text, const std::string &pattern) {
+  const std::string all(text);
+  const std::regex regex(pattern);
+  std::set<std::string> found;
+  for (std::sregex_iterator at(all.begin(), all.end(), regex); at != std::sregex_iterator(); ++at) {
+    found.insert((*at)[1].str());
+  }
+  return found;
+}
+
+// A variable without a value turns a colour black, or takes an outline away, and no browser complains.
+TEST(Page, EveryVariableHasAValueInBothThemes) {
+  const std::string all = std::string(assets::kStyle) + std::string(assets::kLiveStyle);
+  const auto colours_of = [&](const std::string &theme) {
+    const std::size_t begin = all.find(theme + " {\n");
+    EXPECT_NE(begin, std::string::npos) << theme;
+    return matches(all.substr(begin, all.find('}', begin) - begin), "--([a-z-]+):");
+  };
+  const std::set<std::string> colours = colours_of(":root");
+  EXPECT_EQ(colours_of(":root[data-theme=dark]"), colours);
+  std::set<std::string> used = matches(all, R"(var\(--([a-z-]+))");
+  used.erase("look");  // of a swatch, which the page's script gives it
+  used.merge(matches(assets::kScript, R"(colour\('([a-z-]+)'\))"));
+  EXPECT_GT(used.size(), 5U);
+  for (const std::string &name : used) EXPECT_TRUE(colours.contains(name)) << name << " has no value";
+  EXPECT_EQ(matches(all, R"((var\([^)]*,))"), std::set<std::string>()) << "a fallback hides a variable without a value";
 }
 
 // Returns the keys of an object literal of the page's script, which has one key a line.

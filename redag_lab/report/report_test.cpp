@@ -115,6 +115,7 @@ TEST(Verdict, MissesAreCountedNamedAndNotProvenAway) {
   EXPECT_EQ(sentences[0].tone, Tone::Bad);
   EXPECT_NE(sentences[0].text.find("hi "), std::string::npos) << sentences[0].text;
   EXPECT_NE(sentences[0].text.find(", none in the other one."), std::string::npos) << sentences[0].text;
+  EXPECT_EQ(sentences[0].text.find("to spare"), std::string::npos) << sentences[0].text;
   EXPECT_NE(sentences[1].text.find("not every deadline is shown"), std::string::npos) << sentences[1].text;
 }
 
@@ -185,6 +186,46 @@ TEST(Group, PoolsRepetitionsAndRefusesStrangers) {
   EXPECT_FALSE(both.fits(simulated(renamed, kSecond).info));
 }
 
+// Returns a run of a task released every 10 ms. Job k ends `ends[k]` ms after its release; 0: it is skipped.
+trace::Trace run_of(const std::vector<Time> &ends) {
+  TraceBuilder run(testing::make_workload({testing::make_dag("control", {{"t", 10, 1}})}, 1));
+  for (std::uint32_t k = 0; k < ends.size(); ++k) {
+    const Time r = 10 * static_cast<Time>(k);
+    run.at(r).arrives("t", k);
+    if (ends[k] == 0) {
+      run.skipped("t", k, Reason::Overrun);
+    } else {
+      run.dispatched("t", k, 0, r + 10).at(r + ends[k]).finished("t", k, 0);
+    }
+  }
+  return run.until(10 * static_cast<Time>(ends.size()) + 10);
+}
+
+TEST(Group, ExplainsTheRunWithMostMisses) {
+  const std::vector<trace::Trace> runs = {run_of({1, 19, 1}), run_of({0, 1, 0}), run_of({1, 1, 1}), run_of({0, 0, 1})};
+  const Group group = group_of("x", runs);
+  EXPECT_EQ(group.worst_run(), 1U) << "two misses, and the first such run";
+  EXPECT_EQ(group.why().misses, 2U);
+  const json document = json::parse(to_json(groups(group_of("x", runs))));
+  const json &shown = document["groups"][0];
+  EXPECT_EQ(shown["worst_run"], 1);
+  const json &view = shown["schedule"]["views"][0];
+  EXPECT_EQ(view["job"], 0) << "the worst miss, not the latest of the jobs that finished";
+  EXPECT_EQ(view["missed"], true);
+  EXPECT_TRUE(view["lateness_ns"].is_null());
+  EXPECT_EQ(shown["why"]["worst"]["number"][0], 0);
+  EXPECT_EQ(shown["timeline"]["missed"][0].front(), 1);
+  EXPECT_EQ(document["cuts"].size(), 0U) << "the page says it where it shows the run";
+}
+
+TEST(Group, WithoutAMissExplainsTheRunThatCameClosest) {
+  const Group group = group_of("x", {run_of({1, 1}), run_of({2, 8}), run_of({7, 1})});
+  EXPECT_EQ(group.worst_run(), 1U);
+  ASSERT_FALSE(group.schedule().views.empty());
+  EXPECT_EQ(group.schedule().views.front().job->number, 1U);
+  EXPECT_NE(verdict_of(group).front().text.find("with 2ms to spare"), std::string::npos);
+}
+
 TEST(Document, SaysWhatTheRunsWere) {
   std::vector<Group> all = groups(group_of("redag", {simulated(hi_and_lo(PreemptionMode::Os), kSecond)}));
   all.push_back(group_of("ste", {simulated(hi_and_lo(PreemptionMode::Os), kSecond, "ste")}));
@@ -196,6 +237,7 @@ TEST(Document, SaysWhatTheRunsWere) {
   EXPECT_EQ(redag["tasks"][0]["bound_ns"], 2'000'000);
   EXPECT_EQ(redag["total"]["released"], 120);
   EXPECT_EQ(redag["schedule"]["windows"][0]["slices"]["task"].size(), redag["schedule"]["slices_in_all"]);
+  EXPECT_EQ(document["headline"]["text"], "redag missed none of its deadlines and ste 16.7 %");
   EXPECT_EQ(document["comparison"]["dags"].size(), 2U);
   EXPECT_EQ(document["comparison"]["dags"][0]["groups"][0]["missed"], 0);
   EXPECT_GT(document["comparison"]["dags"][0]["groups"][1]["missed"], 0);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <queue>
 #include <span>
@@ -45,11 +46,13 @@ class FirstFew {
 using Earliest = FirstFew<Time, std::less<>>;
 using Latest = FirstFew<Time, std::greater<>>;
 
-// The first pass: how much there is, and the job of each DAG with the largest lateness, as a share of its deadline.
+// The first pass: how much there is, the job of the first view, and the job of each other DAG with the largest
+// lateness, as a share of its deadline.
 class Survey {
  public:
-  explicit Survey(const trace::RunInfo &run)
+  Survey(const trace::RunInfo &run, const std::optional<metrics::JobId> &first)
       : refs_(flatten(run.workload)),
+        first_(first),
         end_(run.end),
         slices_of_run_(run),
         folder_(run.workload),
@@ -65,7 +68,7 @@ class Survey {
   void finish() {
     slices_of_run_.finish();
     count_slices();
-    jobs_ += folder_.in_flight().size();
+    for (const JobRecord &job : folder_.in_flight()) see(job);
   }
 
   [[nodiscard]] std::vector<JobRecord> worst(std::size_t most) const {
@@ -100,15 +103,19 @@ class Survey {
 
   void see(const JobRecord &job) {
     ++jobs_;
+    std::optional<Worst> &dag = worst_[refs_[job.task.value].dag.value];
+    if (first_ && job.task == first_->task && job.number == first_->number) {
+      dag = Worst{job, std::numeric_limits<double>::infinity()};
+    }
     if (job.outcome != JobOutcome::Finished) return;
     const Duration relative = std::max<Duration>(1, job.deadline - job.release);
     const double share = static_cast<double>(job.lateness()) / static_cast<double>(relative);
-    std::optional<Worst> &dag = worst_[refs_[job.task.value].dag.value];
     const bool is_worse = !dag || share > dag->share || (share == dag->share && job.sequence < dag->job.sequence);
     if (is_worse) dag = Worst{job, share};
   }
 
   std::vector<TaskRef> refs_;
+  std::optional<metrics::JobId> first_;
   Time end_;
   SliceFolder slices_of_run_;
   metrics::JobFolder folder_;
@@ -202,7 +209,7 @@ Result<std::vector<Window>> place_windows(const trace::Recording &run, const Sur
   Earliest first(share, std::less<>());
   std::vector<Placement> placements;
   placements.reserve(worst.size());
-  for (const JobRecord &job : worst) placements.emplace_back(job.finish, share);
+  for (const JobRecord &job : worst) placements.emplace_back(std::min(job.finish, run.info().end), share);
   SliceFolder folder(run.info());
   const auto take = [&](const Slice &slice) {
     first.add(slice.begin);
@@ -255,20 +262,20 @@ Result<void> fill_windows(const trace::Recording &run, std::vector<Window> &wind
 
 // The view adds the job's length before and after the job.
 View view_of(const JobRecord &job, std::size_t window, const Window &seen) {
-  const Duration length = std::max<Duration>(job.finish - job.release, job.deadline - job.release);
+  const Time end = std::max(std::min(job.finish, seen.end), job.deadline);
+  const Duration length = end - job.release;
   return {.window = window,
           .begin = std::max(seen.begin, job.release - length),
-          .end = std::min(seen.end, std::max(job.finish, job.deadline) + length),
-          .task = job.task,
-          .job = job.number,
-          .lateness = job.lateness()};
+          .end = std::min(seen.end, end + length),
+          .job = job};
 }
 
 }  // namespace
 
-Result<Schedule> schedule_of(const trace::Recording &run, std::size_t most, std::size_t most_views) {
+Result<Schedule> schedule_of(const trace::Recording &run, std::size_t most, std::size_t most_views,
+                             const std::optional<metrics::JobId> &first) {
   most = std::max<std::size_t>(most, 1);
-  Survey survey(run.info());
+  Survey survey(run.info(), first);
   Result<void> read = run.visit([&](std::span<const JobEvent> events) { survey.add(events); });
   if (!read) return tl::unexpected<Diagnostics>(std::move(read.error()));
   survey.finish();
@@ -287,12 +294,12 @@ Result<Schedule> schedule_of(const trace::Recording &run, std::size_t most, std:
   }
   read = fill_windows(run, schedule.windows, share, survey.end());
   if (!read) return tl::unexpected<Diagnostics>(std::move(read.error()));
-  const Window &first = schedule.windows.front();
-  schedule.views.push_back(View{0, first.begin, first.end, {}, 0, 0});
   for (std::size_t i = 0; i < worst.size(); ++i) {
     const std::size_t window = is_whole ? 0 : i + 1;
     schedule.views.push_back(view_of(worst[i], window, schedule.windows[window]));
   }
+  const Window &beginning = schedule.windows.front();
+  schedule.views.push_back({.window = 0, .begin = beginning.begin, .end = beginning.end, .job = std::nullopt});
   for (const Window &window : schedule.windows) schedule.slices_shown += window.slices.size();
   return schedule;
 }

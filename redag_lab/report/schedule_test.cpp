@@ -83,8 +83,29 @@ TEST(Schedule, OfAShortRunIsWholeWithAViewForEachDag) {
   for (const View &view : schedule.views) {
     EXPECT_LT(view.begin, view.end);
     EXPECT_GE(view.begin, 0);
+    EXPECT_EQ(view.job.has_value(), &view != &schedule.views.back()) << "the last one is the beginning";
   }
-  EXPECT_FALSE(schedule.views[0].task.valid());
+}
+
+TEST(Schedule, BeginsWithTheJobThatIsAskedFor) {
+  TraceBuilder run(hi_and_lo());
+  run.at(0).arrives("h", 0).dispatched("h", 0, 0, 10).at(15).finished("h", 0, 0);  // late
+  run.at(20).arrives("h", 1).at(30).skipped("h", 1, Reason::Overrun);
+  run.at(50).arrives("l", 0).dispatched("l", 0, 0, 100).at(120).finished("l", 0, 0);  // late
+  run.at(180).arrives("h", 2);                                                        // overdue at the end
+  const trace::Trace trace = run.until(200);
+  for (const std::uint32_t number : {1U, 2U}) {
+    const Schedule schedule = schedule_of(trace, 1000, 6, metrics::JobId{run.id("h"), number}).value();
+    ASSERT_EQ(schedule.views.size(), 3U) << "one for each DAG, and the beginning";
+    const View &first = schedule.views.front();
+    ASSERT_TRUE(first.job);
+    EXPECT_EQ(first.job->task, run.id("h"));
+    EXPECT_EQ(first.job->number, number);
+    EXPECT_LT(first.begin, first.job->release) << "with what came before";
+    EXPECT_GE(first.end, first.job->deadline);
+    EXPECT_LE(first.end, ms(200));
+    EXPECT_EQ(schedule.views[1].job->task, run.id("l"));
+  }
 }
 
 TEST(Schedule, OfALongRunStaysSmallAndShowsTheWorstJobs) {
@@ -95,20 +116,20 @@ TEST(Schedule, OfALongRunStaysSmallAndShowsTheWorstJobs) {
   ASSERT_EQ(schedule.windows.size(), 3U) << "the beginning, and one for each DAG";
   EXPECT_LE(schedule.slices_shown, kMost + 10) << "those that only touch a window are in it too";
   EXPECT_GT(schedule.slices_in_all, 10 * kMost);
-  for (std::size_t i = 1; i < schedule.views.size(); ++i) {
+  for (std::size_t i = 0; i + 1 < schedule.views.size(); ++i) {
     const View &view = schedule.views[i];
     const Window &window = schedule.windows[view.window];
     const auto job = std::find_if(window.jobs.begin(), window.jobs.end(), [&](const JobRecord &each) {
-      return each.task == view.task && each.number == view.job;
+      return each.task == view.job->task && each.number == view.job->number;
     });
     ASSERT_NE(job, window.jobs.end()) << "the job that the view is about";
-    EXPECT_EQ(job->lateness(), view.lateness);
+    EXPECT_EQ(*job, *view.job);
     for (const JobRecord &other : jobs) {
-      if (other.task == view.task && other.finish != kNever) {
-        EXPECT_LE(other.lateness(), view.lateness);
+      if (other.task == job->task && other.finish != kNever) {
+        EXPECT_LE(other.lateness(), job->lateness());
       }
     }
-    const auto drawn = [&](const Slice &slice) { return slice.task == view.task && slice.job == view.job; };
+    const auto drawn = [&](const Slice &slice) { return slice.task == job->task && slice.job == job->number; };
     EXPECT_TRUE(std::any_of(window.slices.begin(), window.slices.end(), drawn));
   }
 }
@@ -123,11 +144,11 @@ TEST(Schedule, WindowsHaveTheirShareOfSlicesAndAllJobsWithin) {
   ASSERT_EQ(schedule.windows.size(), 3U);
   EXPECT_EQ(schedule.windows[0].begin, 0);
   EXPECT_EQ(schedule.windows[0].end, slices[kShare - 1].begin);
-  for (std::size_t i = 1; i < schedule.views.size(); ++i) {
+  for (std::size_t i = 0; i + 1 < schedule.views.size(); ++i) {
     const View &view = schedule.views[i];
     const Window &window = schedule.windows[view.window];
     const auto job = std::find_if(jobs.begin(), jobs.end(), [&](const JobRecord &each) {
-      return each.task == view.task && each.number == view.job;
+      return each.task == view.job->task && each.number == view.job->number;
     });
     ASSERT_NE(job, jobs.end());
     const auto later =

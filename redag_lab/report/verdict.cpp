@@ -17,16 +17,12 @@ std::string plural(std::uint64_t count, const std::string &noun) {
   return fmt::format("{} {}{}", format_count(count), noun, count == 1 ? "" : "s");
 }
 
+// Without a miss: how close it was.
 std::string closest(const Group &group) {
   if (!group.latest()) return {};
   const metrics::JobRecord &job = group.latest()->record;
-  const std::string name = trace::task_name(group.workload(), job.task);
-  const Duration lateness = job.lateness();
-  if (lateness > 0) {
-    return fmt::format(" The worst relative to its deadline was {}, {} late at {}.", name, humanize_duration(lateness),
-                       humanize_duration(group.latest()->since));
-  }
-  return fmt::format(" The closest to its deadline was {}, with {} to spare.", name, humanize_duration(-lateness));
+  return fmt::format(" The closest to its deadline was {}, with {} to spare.",
+                     trace::task_name(group.workload(), job.task), humanize_duration(-job.lateness()));
 }
 
 Tone tone_of(const metrics::DeadlineVerdict &verdict) {
@@ -40,7 +36,7 @@ metrics::DeadlineVerdict deadlines_of(const Group &group) {
 
 Sentence on_deadlines(const Group &group) {
   const metrics::DeadlineVerdict verdict = deadlines_of(group);
-  return {tone_of(verdict), verdict.is_judged ? verdict.text + closest(group) : verdict.text};
+  return {tone_of(verdict), verdict.is_met ? verdict.text + closest(group) : verdict.text};
 }
 
 std::string first_of(std::vector<std::string> names, std::size_t most) {
@@ -239,7 +235,7 @@ Sentence headline_of(std::span<const Group> groups) {
     return {tone_of(verdict), verdict.headline};
   }
   std::vector<Contender> contenders;
-  std::string shares;
+  std::vector<std::string> shares;
   bool any = false;
   for (const Group &group : groups) {
     std::vector<double> misses;
@@ -247,12 +243,15 @@ Sentence headline_of(std::span<const Group> groups) {
     const metrics::JobCounts &total = group.total();
     contenders.push_back(
         {.name = group.label(), .missed = total.missed(), .released = total.released, .misses = spread_of(misses)});
-    shares +=
-        fmt::format("{}{} {}", shares.empty() ? "" : ", ", group.label(), format_share(total.missed(), total.released));
+    const std::string share = total.missed() == 0 ? "none" : format_percent(total.miss_ratio_with_lost());
+    shares.push_back(shares.empty() ? fmt::format("{} missed {} of its deadlines", group.label(), share)
+                                    : fmt::format("{} {}", group.label(), share));
     any = any || total.missed() > 0;
   }
   if (!any) return {Tone::Good, "No job missed its deadline under any executor"};
-  return {Tone::Plain, fmt::format("Deadlines: {} ({} of all jobs)", ranking(contenders), shares)};
+  const std::string order = ranking(contenders);
+  const bool is_plain = order.ends_with(" misses fewest");  // the shares say so
+  return {Tone::Plain, join(shares) + (is_plain ? "" : ": " + order)};
 }
 
 std::vector<Sentence> compare(std::span<const Group> groups) {

@@ -49,7 +49,7 @@ WorstJob row_of(const metrics::Explanation &one, const trace::RunInfo &run) {
 // By column, with times in ns.
 Json to_json(const std::vector<WorstJob> &worst, const Workload &workload) {
   Json rows = Json::object();
-  for (const char *name : {"task", "number", "since", "lateness", "outcome", "reason", "main"})
+  for (const char *name : {"task", "number", "since", "lateness", "outcome", "reason", "main", "main_ns"})
     rows[name] = Json::array();
   for (const WorstJob &row : worst) {
     rows["task"].push_back(row.job.task.value);
@@ -59,36 +59,34 @@ Json to_json(const std::vector<WorstJob> &worst, const Workload &workload) {
     rows["outcome"].push_back(static_cast<int>(row.job.outcome));
     rows["reason"].push_back(static_cast<int>(row.job.reason));
     rows["main"].push_back(row.main_cause ? Json(metrics::describe(*row.main_cause, workload)) : Json());
+    rows["main_ns"].push_back(row.main_cause ? Json(row.main_cause->time) : Json());
   }
   return rows;
 }
 
 }  // namespace
 
-Result<WhyDigest> why_of(const trace::Recording &run, const std::optional<metrics::KernelRecord> &kernel,
-                         const Schedule &schedule, std::size_t most) {
-  const Result<metrics::Investigation> investigation = metrics::Investigation::of(run, kernel, most);
-  if (!investigation) return tl::unexpected<Diagnostics>(investigation.error());
-  std::vector<metrics::Subject> subjects = investigation->misses();
-  if (subjects.empty()) subjects = investigation->closest(kClosest);
+Result<WhyDigest> why_of(const metrics::Investigation &investigation, const Schedule &schedule) {
+  std::vector<metrics::Subject> subjects = investigation.misses();
+  if (subjects.empty()) subjects = investigation.closest(kClosest);
   std::set<metrics::JobId> seen;
   for (const Window &window : schedule.windows) {
     for (const metrics::JobRecord &job : window.jobs) seen.insert({job.task, job.number});
   }
   WhyDigest why;
-  why.misses = investigation->missed();
+  why.misses = investigation.missed();
   why.explained = subjects.size();
   why.worst.resize(std::min(kMostListed, subjects.size()));
   metrics::CulpritCount causes;
   std::map<std::size_t, metrics::Explanation> shown;  // by rank
   const auto take = [&](std::size_t rank, metrics::Explanation one) {
     causes.add(one);
-    if (rank < why.worst.size()) why.worst[rank] = row_of(one, run.info());
+    if (rank < why.worst.size()) why.worst[rank] = row_of(one, investigation.run());
     if (rank >= kWorst && !seen.contains({one.job.task, one.job.number})) return;
     shown.emplace(rank, std::move(one));
     if (shown.size() > kMostShown) shown.erase(std::prev(shown.end()));
   };
-  const Result<std::uint64_t> explained = investigation->explain(subjects, take);
+  const Result<std::uint64_t> explained = investigation.explain(subjects, take);
   if (!explained) return tl::unexpected<Diagnostics>(explained.error());
   why.causes = causes.sorted();
   for (auto &[rank, one] : shown) why.jobs.push_back(std::move(one));

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
-#include "redag/trace/recording.hpp"
 #include "redag_analysis/metrics/why.hpp"
 #include "redag_lab/report/schedule.hpp"
 
@@ -33,10 +32,8 @@ struct WhyDigest {
   std::vector<metrics::Explanation> jobs;  // the worst misses, and those that the schedule shows
 };
 
-/// Explains a run, up to `most` misses of it. Without a miss, the jobs are those that came closest to one. `kernel` is
-/// null if there is no record. Error: a damaged file.
-[[nodiscard]] Result<WhyDigest> why_of(const trace::Recording &run, const std::optional<metrics::KernelRecord> &kernel,
-                                       const Schedule &schedule, std::size_t most);
+/// Explains the misses of a run. Without a miss, the jobs are those that came closest to one. Error: a damaged file.
+[[nodiscard]] Result<WhyDigest> why_of(const metrics::Investigation &investigation, const Schedule &schedule);
 
 /// Returns the object `why` of a group (docs/results_format.md) as JSON.
 [[nodiscard]] std::string to_json(const WhyDigest &why, const Workload &workload);

@@ -53,6 +53,77 @@ for (const [name, figures] of Object.entries(FIGURES)) {
   });
 }
 
+await test('the first screen holds the verdict, one picture, and the worst misses with their causes', async () => {
+  for (const name of ['comparison', 'single', 'perception']) {
+    const {page, problems, close} = await open(name, {viewport: {width: 1280, height: 720}});
+    const document = JSON.parse(await page.locator('#data').textContent());
+    const missing = document.groups.filter(({why}) => why.misses > 0);
+    assert.match(await page.locator('h2.headline').innerText(), name === 'comparison' ? /^redag missed none of its deadlines, mte [\d.]+.% and ste [\d.]+.%$/ : /./);
+    const shown = name === 'comparison' ? ['h2.headline', 'figure[data-figure=missed] .chart', '.worst'] : ['h2.headline'];
+    for (const what of shown) {
+      const {y, height} = await page.locator(what).boundingBox();
+      assert.ok(y + height <= 720, `${name}: ${what} ends at ${y + height}`);
+    }
+    assert.equal(await page.locator('.worst b', {hasText: 'Cause'}).count(), missing.length, name);
+    for (const {why} of missing) {
+      const said = await page.locator('.worst').innerText();
+      assert.ok(said.includes(why.worst.main[0] ?? 'lost at its release'), said);
+    }
+    none(problems);
+    await close();
+  }
+});
+
+await test('the schedule opens at the worst miss of the worst run, which a click on the first screen shows', async () => {
+  const {page, problems, close} = await open('comparison', {viewport: {width: 1280, height: 900}});
+  const {groups} = JSON.parse(await page.locator('#data').textContent());
+  for (const [g, {label, why, runs, worst_run: worst, schedule}] of groups.entries()) {
+    await page.getByRole('button', {name: label, exact: true}).click();
+    assert.ok(runs[worst].missed === Math.max(...runs.map(({missed}) => missed)), label);
+    const [from, to] = await page.locator('figure[data-figure=schedule]').evaluate(({dataset}) => [Number(dataset.from), Number(dataset.to)]);
+    const released = why.worst.since[0];
+    assert.ok(from <= released && released < to, `${label}: ${released} is not between ${from} and ${to}`);
+    assert.deepEqual([schedule.views[0].task, schedule.views[0].job], [why.worst.task[0], why.worst.number[0]]);
+    assert.equal(await page.locator('h2#schedule ~ div p.soft').first().innerText(), `Of repetition-${worst + 1}, the worst of 3 runs.`);
+    if (why.misses === 0) continue;
+    await page.getByRole('button', {name: groups[0].label, exact: true}).click();
+    await page.evaluate(() => window.scrollTo(0, 0));
+    await page.locator('.worst > div').nth(g).getByRole('button').click();
+    const {top} = await page.locator('#detail').evaluate((node) => node.getBoundingClientRect());
+    assert.ok(top >= 0 && top < 300, `the schedule is at ${top}`);
+    assert.equal(await page.getByRole('button', {name: label, exact: true}).getAttribute('aria-pressed'), 'true');
+    await figureShot(page, 'schedule', `first-look-${label}`);
+  }
+  none(problems);
+  await close();
+});
+
+await test('shares end at 100 %, and no number stands on the range of its repetitions', async () => {
+  const {page, problems, close} = await open('comparison');
+  const look = (name) => page.locator(`figure[data-figure=${name}] .chart`).evaluate((box) => {
+    const boxOf = (shape) => shape.getBoundingClientRect();
+    const texts = [...box.querySelectorAll('svg text')].filter((text) => /\d\s?(%|\u00b5?[mn]?s)$/.test(text.textContent));
+    const isTick = (text) => text.getAttribute('text-anchor') === 'end';
+    const numbers = texts.filter((text) => !isTick(text)).map(boxOf);
+    const lines = [...box.querySelectorAll('svg path')].filter((shape) => shape.getAttribute('fill') === 'none').map(boxOf).filter(({width, height}) => width < 3 && height > 1 && height < 200);
+    const meet = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom - 1 && b.top < a.bottom - 1;
+    const filled = [...box.querySelectorAll('svg path')].filter((shape) => !['none', 'transparent'].includes(shape.getAttribute('fill'))).map(boxOf);
+    return {ticks: texts.filter(isTick).map((text) => text.textContent), numbers: numbers.length,
+      bars: filled.filter(({width, height}) => height > 20 && width > 8 && width < 80).length, overprinted: numbers.filter((number) => lines.some((line) => meet(number, line))).length};
+  });
+  const missed = await look('missed');
+  assert.ok(missed.ticks.length > 2 && missed.ticks.every((tick) => parseFloat(tick) <= 100), missed.ticks.join(', '));
+  assert.ok(missed.bars >= 2);
+  const p99 = await look('p99');
+  assert.equal(p99.bars, 0, 'dots: a logarithmic axis has no zero for bars');
+  for (const {numbers, overprinted} of [missed, p99]) {
+    assert.ok(numbers >= 9, `${numbers} numbers`);
+    assert.equal(overprinted, 0);
+  }
+  none(problems);
+  await close();
+});
+
 await test('dark: figures and page follow the system, and the reader', async () => {
   const {page, problems, close} = await open('comparison', {colorScheme: 'dark'});
   const background = () => page.evaluate(() => getComputedStyle(document.body).backgroundColor);

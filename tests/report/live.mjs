@@ -97,6 +97,34 @@ await test('an executor is shown, and the token leaves the address', async () =>
   await close();
 });
 
+/** The contrast of what a selector draws to the page, in WCAG 2. */
+const contrast = (page, selector, property) => page.locator(selector).first().evaluate((node, name) => {
+  const luminance = (colour) => colour.match(/[\d.]+/g).slice(0, 3).map((part) => part / 255)
+    .map((c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4)).reduce((sum, c, i) => sum + c * [0.2126, 0.7152, 0.0722][i], 0);
+  const [low, high] = [getComputedStyle(node)[name], getComputedStyle(document.body).backgroundColor].map(luminance).sort((a, b) => a - b);
+  return (high + 0.05) / (low + 0.05);
+}, property);
+
+await test('contrast: axe-core finds nothing, and marks can be seen, in light and dark', async () => {
+  const axe = fs.readFileSync(path.join(scratch, 'node_modules', 'axe-core', 'axe.min.js'), 'utf8');
+  for (const colorScheme of ['light', 'dark']) {
+    const {page, problems, close} = await open({colorScheme});
+    await page.waitForFunction(() => document.querySelectorAll('.spread rect.in-time').length > 5);
+    await page.getByRole('button', {name: 'p99', exact: true}).click();
+    for (const [selector, property] of [['.spread rect.in-time', 'fill'], ['.spread line', 'stroke'], ['th[aria-sort] button', 'color'], ['.bar > div', 'backgroundColor']]) {
+      const found = await contrast(page, selector, property);
+      assert.ok(found >= 3, `${colorScheme}: ${selector} has a contrast of ${found.toFixed(2)}`);
+    }
+    await page.getByRole('searchbox').focus();
+    assert.notEqual(await page.getByRole('searchbox').evaluate((node) => getComputedStyle(node).outlineStyle), 'none');
+    await page.evaluate(axe);
+    const {violations} = await page.evaluate(() => window.axe.run(document, {resultTypes: ['violations']}));
+    assert.deepEqual(violations.flatMap(({id, nodes}) => nodes.slice(0, 4).map(({html}) => `${id}: ${html.slice(0, 140)}`)), [], colorScheme);
+    none(problems);
+    await close();
+  }
+});
+
 await test('dark: the page follows the system, and the reader', async () => {
   const {page, problems, close} = await open({colorScheme: 'dark'});
   const background = () => page.evaluate(() => getComputedStyle(document.body).backgroundColor);

@@ -35,6 +35,14 @@ struct ReportArguments {
   bool json = false;
 };
 
+// "results/report.html: 8 KB, opens in any browser without a network".
+std::string page_text(const std::string &path, const std::string &html) {
+  constexpr std::size_t kMega = 1'000'000;
+  const auto size = static_cast<double>(html.size());
+  return fmt::format("{}: {}, opens in any browser without a network\n", path,
+                     html.size() < kMega ? fmt::format("{:.0f} KB", size / 1e3) : fmt::format("{:.1f} MB", size / 1e6));
+}
+
 class Reporting {
  public:
   Reporting(const ReportArguments &options, Console &console)
@@ -136,8 +144,7 @@ class Reporting {
     for (const report::Group &group : groups_) {
       text += (groups_.size() > 1 ? group.label() + ": " : "") + report::verdict_of(group).front().text + "\n";
     }
-    text += fmt::format("{}: {:.1f} MB, opens in any browser without a network\n", path,
-                        static_cast<double>(html.size()) / 1e6);
+    text += page_text(path, html);
     if (options_.json) {
       console_.note(text);
     } else {
@@ -168,10 +175,7 @@ int write_page(const ReportArguments &options, const fs::path &folder, const std
     console.note(written.error());
     return kExitBad;
   }
-  const std::string words = fmt::format(
-      "{}\n"
-      "{}: {:.1f} MB, opens in any browser without a network\n",
-      summary, path, static_cast<double>(html.size()) / 1e6);
+  const std::string words = summary + "\n" + page_text(path, html);
   if (options.json) {
     console.note(words);
   } else {

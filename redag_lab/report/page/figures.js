@@ -251,16 +251,9 @@ function timelineFigure(groups, state) {
   return fig;
 }
 
-/** Returns the next number of one or two digits, for the end of an axis. */
-function roundUp(value) {
-  if (value <= 0) return 1;
-  const unit = 10 ** (Math.floor(Math.log10(value)) - 1);
-  return Number((Math.ceil(value / unit / 5) * 5 * unit).toPrecision(2));
-}
-
 /**
- * Draws one number of every DAG under every executor. `value(row, cell)` returns {at, min, max}, or null without a
- * value; `limit(cell)` the deadline of that number, or null.
+ * Draws one number of every DAG under every executor: as a bar, or on a logarithmic axis, which has no zero, as a dot.
+ * `value(row, cell)` returns {at, min, max}, or null without a value; `limit(cell)` the deadline of that number, or null.
  */
 function comparisonFigure({name, title, groups, rows, value, limit = () => null, log, format, formatAxis, caption}) {
   const bars = {barGap: '12%', barMaxWidth: 46};
@@ -279,7 +272,7 @@ function comparisonFigure({name, title, groups, rows, value, limit = () => null,
       if (log && !rows.some((row) => row.groups.some((cell) => value(row, cell) !== null))) return 'No job finished.';
       const floor = log ? 10 ** Math.floor(Math.log10(Math.min(...positive) / 2)) : 0;
       const spread = (row, g) => value(row, row.groups[g]) || {at: null, min: null, max: null};
-      const longest = Math.max(0, ...rows.flatMap((row) => groups.map((_, g) => spread(row, g).max)));
+      const hasLabels = groups.length * rows.length * (log ? 78 : 46) <= width;
       // A line in ink, on a bar of any shade.
       const inked = (shape, style) => [{type: 'line', shape, style: {stroke: t.paper, lineWidth: 4}}, {type: 'line', shape, style: {stroke: t.ink, ...style}}];
       return {
@@ -297,22 +290,21 @@ function comparisonFigure({name, title, groups, rows, value, limit = () => null,
         },
         xAxis: {type: 'category', data: rows.map((row) => row.name), axisTick: {show: false}, axisLabel: {color: t.ink, interval: 0}},
         yAxis: {
-          type: log ? 'log' : 'value', min: log ? floor : 0, max: log ? Math.max(...positive) * 1.6 : roundUp(1.02 * longest), name: title, nameTextStyle: {align: 'left'},
+          type: log ? 'log' : 'value', min: floor, max: log ? Math.max(...positive) * 1.6 : undefined, name: title, nameTextStyle: {align: 'left'},
           axisLabel: {formatter: formatAxis, showMaxLabel: log ? false : undefined},
         },
         series: [
-          ...groups.map((group, g) => ({
+          ...(log ? [] : groups.map((group, g) => ({
             type: 'bar', name: group.label, ...bars, itemStyle: {...fillOf(t, shadeOf(t, g)), borderRadius: [3, 3, 0, 0]},
             data: rows.map((row) => spread(row, g).at),
-            label: {show: groups.length * rows.length * (log ? 78 : 60) <= width, position: 'top', color: t.soft, fontSize: 11, distance: 6,
-              formatter: (item) => format(item.value)},
-          })),
+          }))),
           ...groups.map((group, g) => ({
-            // The deadline, and a line from the lowest to the highest repetition, over the executor's bar.
-            type: 'custom', name: group.label, silent: true, z: 5, data: rows.map((row, i) => [i, spread(row, g).min, spread(row, g).max]),
+            // The deadline, a line from the lowest to the highest repetition, the dot, and above all of them the number.
+            type: 'custom', name: group.label, silent: !log, z: 5, color: shadeOf(t, g).color, data: rows.map((row, i) => [i, spread(row, g).max]),
+            encode: {x: 0, y: 1},
             renderItem: (params, api) => {
               const place = api.value(0);
-              const [low, high] = [api.value(1), api.value(2)];
+              const {at, min, max} = spread(rows[place], g);
               const layout = api.barLayout({count: groups.length, ...bars})[g];
               const x = api.coord([place, floor || 0])[0] + layout.offsetCenter;
               const y = (number) => api.coord([place, Math.max(number, floor)])[1];
@@ -322,9 +314,17 @@ function comparisonFigure({name, title, groups, rows, value, limit = () => null,
                 const half = layout.width * 0.56;
                 children.push(...inked({x1: x - half, x2: x + half, y1: y(deadline), y2: y(deadline)}, {lineWidth: 1.8, lineDash: [5, 3]}));
               }
-              if (low !== high) {
-                const ends = [{x1: x, x2: x, y1: y(high), y2: y(low)}, ...[low, high].map((end) => ({x1: x - 4, x2: x + 4, y1: y(end), y2: y(end)}))];
+              if (at !== null && min !== max) {
+                const ends = [{x1: x, x2: x, y1: y(max), y2: y(min)}, ...[min, max].map((end) => ({x1: x - 4, x2: x + 4, y1: y(end), y2: y(end)}))];
                 children.push(...ends.flatMap((shape) => inked(shape, {lineWidth: 1.2})));
+              }
+              if (at !== null && log) {
+                const {color, pattern} = shadeOf(t, g);
+                children.push({type: 'circle', shape: {cx: x, cy: y(at), r: 5}, style: {fill: pattern === 'none' ? color : t.paper, stroke: color, lineWidth: 2.5}});
+              }
+              if (at !== null && hasLabels) {
+                children.push({type: 'text', silent: true, style: {text: format(at), x, y: y(max) - 8, align: 'center', verticalAlign: 'bottom', fontSize: 11, fill: t.soft,
+                  stroke: t.paper, lineWidth: 3}});
               }
               return children.length === 0 ? null : {type: 'group', children};
             },

@@ -5,9 +5,10 @@
 
 const UNITS = [['s', 1e9], ['ms', 1e6], ['\u00b5s', 1e3], ['ns', 1]];
 
-/** "12.35 ms": four significant digits and a suitable unit; a dash for a missing time. */
-function formatTime(ns) {
-  if (ns === null || ns === undefined) return '\u2013';
+/** "12.35 ms": four significant digits, whole nanoseconds and a suitable unit; a dash for a missing time. */
+function formatTime(time) {
+  if (time === null || time === undefined) return '\u2013';
+  const ns = Math.round(time);
   if (ns === 0) return '0';
   const size = Math.abs(ns);
   const [unit, factor] = UNITS.find(([, f]) => size >= f) || UNITS[3];
@@ -28,6 +29,7 @@ const formatCount = (count) => String(count).replace(/\B(?=(\d{3})+$)/g, '\u202f
 /** "14.2 %". A ratio above 0 never reads as 0 %, and one below 1 never as 100 %. */
 function formatPercent(ratio) {
   const percent = 100 * ratio;
+  if (percent === 0) return '0\u00a0%';
   if (percent > 0 && percent < 0.05) return `${Number(percent.toPrecision(2))}\u00a0%`;
   if (percent < 100 && percent >= 99.95) return `${percent.toFixed(Math.min(12, Math.ceil(-Math.log10(100 - percent)) + 1))}\u00a0%`;
   return `${percent.toFixed(1)}\u00a0%`;

@@ -228,7 +228,6 @@ function courseFigure() {
   let drawn = -1;  // when the chart was drawn last; once a second is enough
   const build = (t) => {
     if (lines.size === 0) return 'No response time yet.';
-    const hues = t.hues || t.palette;
     const values = [...lines.values()].flat().map(([, ns]) => ns);
     const least = Math.min(...values);
     return {
@@ -237,7 +236,7 @@ function courseFigure() {
       tooltip: {trigger: 'axis', formatter: (items) => tip([`${Math.round(-items[0].value[0])} s ago`, ...items.map((item) => `${item.seriesName}: ${formatTime(item.value[1])}`)])},
       xAxis: {type: 'value', min: -COURSE_S, max: 0, axisLabel: {formatter: (s) => (s === 0 ? 'now' : `\u2212${-s} s`)}, splitLine: {show: false}},
       yAxis: {type: 'log', min: least / 1.5, axisLabel: {formatter: (ns) => formatTime(Number(ns.toPrecision(2)))}},
-      series: [...lines].map(([name, data], i) => ({name, type: 'line', data: data.map(([s, ns]) => [s - now, ns]), showSymbol: data.length < 3, lineStyle: {width: 1.8}, itemStyle: {color: hues[i % hues.length]}, color: hues[i % hues.length]})),
+      series: [...lines].map(([name, data], i) => ({name, type: 'line', data: data.map(([s, ns]) => [s - now, ns]), showSymbol: data.length < 3, lineStyle: {width: 1.8}, color: hueOf(t, i).color})),
     };
   };
   const fig = figure({name: 'course', height: 300, build, label: 'p99 of the response time over the last two minutes',

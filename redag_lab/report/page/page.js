@@ -31,25 +31,30 @@ function header() {
   ];
 }
 
-function comparisonSection() {
-  if (!several) return [];
+/** Returns the figures of executors side by side: {missed, p99}; null for one executor. */
+function comparisonFigures() {
   const rows = report.comparison.dags;
-  const parts = [heading(2, 'comparison', 'Executors side by side')];
-  if (rows.length === 0) return [...parts, element('p', {}, 'The runs have no DAG in common.')];
-  const figures = [
-    comparisonFigure({
-      name: 'missed', title: 'missed', groups, rows, value: (row, cell) => ({...cell.miss_ratio, at: cell.missed / Math.max(1, cell.released)}), log: false, format: formatPercent,
-      formatAxis: (share) => `${Number((100 * share).toPrecision(3))} %`,
+  if (!several || rows.length === 0) return null;
+  return {
+    missed: comparisonFigure({
+      name: 'missed', title: 'missed deadlines', groups, rows, value: (row, cell) => ({...cell.miss_ratio, at: cell.missed / Math.max(1, cell.released)}), log: false,
+      format: formatPercent, formatAxis: (share) => `${Number((100 * share).toPrecision(3))} %`,
       caption: 'Share of released jobs that were late, skipped or aborted, over all repetitions. Lines: from the lowest to the highest repetition.',
     }),
-    comparisonFigure({
+    p99: comparisonFigure({
       name: 'p99', title: 'p99 end to end', groups, rows, limit: (cell) => cell.deadline_ns, value: (row, cell) => cell.p99_ns && {...cell.p99_ns, at: cell.p99_ns.median}, log: true,
       format: (ns) => (ns > 0 ? formatTime(Number(ns.toPrecision(3))) : ''), formatAxis: (ns) => formatAxisTime(ns, ns),
       caption: '99th percentile of the end-to-end response time (logarithmic): median over the repetitions. Lines: from the lowest to the highest repetition. '
         + 'Dashed: the end-to-end deadline, where the workload states one.',
     }),
-  ];
-  return [...parts, element('div.side-by-side', {}, ...figures.map((fig) => fig.box)), filled(() => comparisonTable(groups, rows))];
+  };
+}
+
+function comparisonSection(figures, ranks) {
+  if (!several) return [];
+  const parts = [heading(2, 'comparison', 'Executors side by side')];
+  if (figures === null) return [...parts, element('p', {}, 'The runs have no DAG in common.')];
+  return [...parts, filled(() => comparisonTable(groups, report.comparison.dags)), verdictList(ranks), figures.p99.box];
 }
 
 function taskChoice(refresh) {
@@ -73,22 +78,27 @@ function detailSections() {
   const schedule = scheduleFigure(groups, state, why.show);
   const redraw = () => { responses.draw(); lateness.draw(); };
 
-  const pick = several ? [element('div.row.executors', {}, element('span.soft', {}, 'Details of'),
-    choice('Executor', groups.map((group) => group.label), 0, (i) => {
-      const name = state.task === null ? null : taskName(groups[state.executor], state.task);
-      state.executor = i;
-      // Keeps the chosen task if the other executor has it.
-      const same = name === null ? -1 : groups[i].tasks.findIndex((task, k) => taskName(groups[i], k) === name);
-      state.task = same < 0 ? null : same;
-      state.view = 0;
-      refill();
-      redraw();
-      timeline.draw();
-      schedule.look();
-      why.refill();
-    }))] : [];
+  const executors = choice('Executor', groups.map((group) => group.label), 0, (i) => {
+    const name = state.task === null ? null : taskName(groups[state.executor], state.task);
+    state.executor = i;
+    // Keeps the chosen task if the other executor has it.
+    const same = name === null ? -1 : groups[i].tasks.findIndex((task, k) => taskName(groups[i], k) === name);
+    state.task = same < 0 ? null : same;
+    state.view = 0;
+    refill();
+    redraw();
+    timeline.draw();
+    schedule.look();
+    why.refill();
+  });
+  const pick = several ? [element('div.row.executors', {}, element('span.soft', {}, 'Details of'), executors)] : [];
+  // Shows the worst miss of an executor in the schedule.
+  const look = (g) => {
+    executors.children[g].click();
+    document.getElementById('detail').scrollIntoView();
+  };
 
-  return [
+  const nodes = [
     ...pick,
     several ? filled(() => [element(`p.headline.${groups[state.executor].headline.tone}`, {}, ...headlineParts(groups[state.executor].headline)), verdictOf(groups[state.executor])]) : null,
     heading(2, 'dags', 'DAGs'), filled(() => dagTable(groups[state.executor])),
@@ -111,7 +121,12 @@ function detailSections() {
     responses.box,
     heading(3, 'lateness', 'Lateness'), lateness.box,
     ...why.nodes,
-    heading(2, 'schedule', 'Schedule'), timeline.box,
+    heading(2, 'schedule', 'Schedule'),
+    filled(() => {
+      const run = nameOfWorstRun(groups[state.executor]);
+      return run ? [element('p.soft', {}, `Of ${run}.`)] : [];
+    }),
+    timeline.box,
     heading(3, 'detail', 'Schedule in detail'),
     element('div.row.controls', {},
       filled(() => dropdown('show', viewNames(groups[state.executor]), state.view, (i) => { state.view = i; schedule.look(); })),
@@ -119,6 +134,7 @@ function detailSections() {
     filled(() => element('p.keys.soft', {}, ...groups[state.executor].dags.slice(0, 24).map((dag, d) => element('span', {}, swatch(hueOf(theme(), d)), dag.name)))),
     schedule.box,
   ];
+  return {nodes, look};
 }
 
 /** Returns the notes on what is not shown. A note common to several executors appears once. */
@@ -156,5 +172,9 @@ function howItWasRun() {
   ];
 }
 
-startPage([...header(), several ? verdictList(report.comparison.words) : verdictOf(groups[0]),
-  element('details', {}, element('summary', {}, 'Colours and lines'), filled(() => colourKey('DAG', 'executor'))), ...comparisonSection(), ...detailSections(), ...howItWasRun()]);
+const figures = comparisonFigures();
+const details = detailSections();
+const [notes, ranks] = [true, false].map((isNote) => report.comparison.words.filter(({tone}) => (tone === 'caution') === isNote));
+const worst = filled(() => worstMisses(groups, details.look) || []);
+startPage([...header(), figures === null ? worst : element('div.first', {}, figures.missed.box, worst), several ? verdictList(notes) : verdictOf(groups[0]),
+  element('details', {}, element('summary', {}, 'Colours and lines'), filled(() => colourKey('DAG', 'executor'))), ...comparisonSection(figures, ranks), ...details.nodes, ...howItWasRun()]);

@@ -108,6 +108,7 @@ function scheduleFigure(groups, state, explain) {
       const inTasks = state.rows === 'tasks';
       const clip = (params, shape) => echarts.clipRectByRect(shape, params.coordSys);
       if (zoom === null) zoom = firstLook(c);
+      Object.assign(fig.box.dataset, {from: zoom[0], to: zoom[1]});  // for tests: the canvas does not tell
       fig.resize(Math.max(160, 96 + ROW_HEIGHT * c.rows.length));
       const missed = (i) => c.slices.job[i] !== null && c.jobs.missed[c.slices.job[i]] === 1;
       return {
@@ -242,9 +243,9 @@ function scheduleFigure(groups, state, explain) {
     },
   });
 
-  // Returns the initial range. The beginning shows as many jobs as fit; a worst job shows its surroundings.
+  // Returns the initial range. A worst job shows its surroundings; the beginning shows as many jobs as fit.
   function firstLook(c) {
-    if (state.view > 0) return [c.view.begin_ns - c.start, c.view.end_ns - c.start];
+    if (c.view.task !== undefined) return [c.view.begin_ns - c.start, c.view.end_ns - c.start];
     const count = window.innerWidth < 640 ? 50 : 120;
     const {release} = c.jobs;
     const until = release.length > count ? c.from + release[count] : c.to;
@@ -258,12 +259,12 @@ function scheduleFigure(groups, state, explain) {
   return fig;
 }
 
-/** Returns the names of the views: "the beginning", "control.pid #12: 2.1 ms late". */
+/** Returns the names of the views: "control.pid #12, 2.1 ms late", "the beginning". */
 function viewNames(group) {
   const all = group.schedule.slices_shown === group.schedule.slices_in_all;
-  return group.schedule.views.map((view) => {
-    if (view.task === undefined) return all ? 'the whole run' : 'the beginning';
-    const how = view.lateness_ns > 0 ? `${formatTime(view.lateness_ns)} late` : `${formatTime(-view.lateness_ns)} to spare`;
-    return `${taskName(group, view.task)} #${view.job}, ${how}`;
+  return group.schedule.views.map(({task, job, missed, lateness_ns: lateness}) => {
+    if (task === undefined) return all ? 'the whole run' : 'the beginning';
+    const how = lateness > 0 ? `${formatTime(lateness)} late` : missed ? 'missed' : `${formatTime(-lateness)} to spare`;
+    return `${taskName(group, task)} #${job}, ${how}`;
   });
 }

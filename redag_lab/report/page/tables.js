@@ -128,10 +128,10 @@ function sinkTimes(group, dag) {
 function dagTable(group) {
   const t = theme();
   const columns = [
-    column('DAG'), column('tasks'), column('rate', 'Rate of its fastest task'), column('jobs'), column('missed', 'Late, skipped or aborted jobs, of all released jobs'),
+    column('DAG'), column('tasks'), column('rate', 'Rate of its fastest task'), column('jobs'), column('missed', 'Jobs of its tasks that were late for their own deadlines, skipped or aborted, of all released jobs'),
     column('end to end p50', 'From a source\u2019s release to a sink\u2019s finish; with several sinks, each figure is that of the worst one'), column('p99'), column('max'),
-    column('bound'), column('deadline', 'End-to-end deadline'), column('late', 'Jobs of sinks that finished after the end-to-end deadline'),
-    column('active / bound', 'Most jobs in progress at any time, and max_active'),
+    column('bound', 'Tightest sound bound on the response end to end'), column('deadline', 'End-to-end deadline'), column('late end to end', 'Jobs of sinks that finished after the end-to-end deadline of the DAG'),
+    column('most active / max_active', 'Most jobs in progress at any time, and the limit on them'),
   ];
   return table('DAGs', columns, group.dags.map((dag, d) => {
     const r = dag.end_to_end.response;

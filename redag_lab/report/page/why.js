@@ -40,6 +40,31 @@ function partsTable(job) {
   return element('div.why', {}, table('Parts of the job', columns, rows, {sortable: false, most: Infinity}));
 }
 
+/** Returns which run was looked into: "", or "repetition-2, the worst of 3 runs". */
+function nameOfWorstRun({runs, worst_run: worst}) {
+  return runs.length === 1 ? '' : `${runs[worst].path.split('/').pop()}, the worst of ${runs.length} runs`;
+}
+
+/**
+ * Returns the worst miss of each group, with its cause and what to change. `look(g)` is called for the one that the
+ * reader wants to see. Null without a miss.
+ */
+function worstMisses(groups, look) {
+  const rows = groups.flatMap((group, g) => {
+    const {misses, worst, jobs} = group.why;
+    const name = groups.length > 1 ? element('h3', {}, named(shadeOf(theme(), g), group.label)) : null;
+    if (misses === 0) return groups.length > 1 ? [element('div', {}, name, element('p.met', {}, 'No deadline missed.'))] : [];
+    const {text, remedy} = jobs.find(({task, number}) => task === worst.task[0] && number === worst.number[0]);
+    const run = nameOfWorstRun(group);
+    return [element('div', {}, name, element('p', {}, element('button.link.missed', {type: 'button', onclick: () => look(g)}, text),
+      element('span.soft', {}, ` ${formatTime(worst.since[0])} after the start${run ? ` of ${run}` : ''}`)),
+    element('p', {}, element('b', {}, 'Cause: '), worst.main[0] ? `${worst.main[0]} for ${formatTime(worst.main_ns[0])}` : 'lost at its release'),
+    remedy ? element('p', {}, element('b', {}, 'What to change: '), remedy) : null)];
+  });
+  if (groups.every(({why}) => why.misses === 0)) return null;
+  return element('section.worst', {}, heading(2, 'worst-miss', groups.length > 1 ? 'The worst miss of each executor' : 'The worst miss'), ...rows);
+}
+
 /** Returns the section and a function that shows a job in it: show(task, number, missed). */
 function whySection(groups, state) {
   const why = () => groups[state.executor].why;
@@ -71,8 +96,9 @@ function whySection(groups, state) {
 
   const intro = place(() => {
     const {misses, explained} = why();
-    const words = misses === 0 ? 'No deadline was missed in this run. These are the jobs that came closest, and what took their time.'
-      : `${formatCount(misses)} job${misses === 1 ? '' : 's'} missed a deadline in this run. ${misses > explained ? `The causes cover the worst ${formatCount(explained)}. ` : ''}`
+    const run = nameOfWorstRun(groups[state.executor]) || 'this run';
+    const words = misses === 0 ? `No deadline was missed. These are the jobs of ${run} that came closest, and what took their time.`
+      : `${formatCount(misses)} job${misses === 1 ? '' : 's'} missed a deadline in ${run}. ${misses > explained ? `The causes cover the worst ${formatCount(explained)}. ` : ''}`
         + 'A job chosen in the list, or clicked on in the schedule, is explained below the list.';
     return [element('p.soft', {}, words)];
   });
