@@ -9,11 +9,10 @@
 #include <fmt/format.h>
 
 #include "redag/base/text.hpp"
+#include "redag/base/words.hpp"
 
 namespace redag::metrics {
 namespace {
-
-std::string jobs_text(std::uint64_t count) { return format_count(count) + (count == 1 ? " job" : " jobs"); }
 
 // Lists only what occurred: "3 late, 2 skipped".
 std::string how_missed(const JobCounts &jobs) {
@@ -39,7 +38,7 @@ std::string by_dag(std::span<const DagSummary> dags) {
   if (where.size() > kMostNamed) {
     const std::size_t more = where.size() - kMostNamed;
     where.resize(kMostNamed);
-    where.push_back(fmt::format("{} other DAG{}", format_count(more), more == 1 ? "" : "s"));
+    where.push_back(plural(more, "other DAG"));
   }
   if (clean == 0) return join(where);
   return join(where) + (clean == 1 ? ", none in the other one" : fmt::format(", none in the other {}", clean));
@@ -60,15 +59,6 @@ std::string late_end_to_end(std::span<const DagSummary> dags) {
 
 }  // namespace
 
-std::string join(const std::vector<std::string> &names) {
-  std::string text;
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    if (i > 0) text += i + 1 == names.size() ? " and " : ", ";
-    text += names[i];
-  }
-  return text;
-}
-
 bool has_misses(const JobCounts &total, std::span<const DagSummary> dags) {
   return total.missed() > 0 ||
          std::any_of(dags.begin(), dags.end(), [](const DagSummary &dag) { return dag.end_to_end.late > 0; });
@@ -84,12 +74,12 @@ DeadlineVerdict deadline_verdict(const JobCounts &total, std::span<const DagSumm
   if (missed > 0) {
     const double share = static_cast<double>(missed) / static_cast<double>(total.released);
     return verdict(true, false,
-                   fmt::format("{} of {} missed their deadline ({})", format_count(missed), jobs_text(total.released),
-                               format_percent(share)),
+                   fmt::format("{} of {} missed their deadline ({})", format_count(missed),
+                               plural(total.released, "job"), format_percent(share)),
                    fmt::format("{}. By DAG: {}.{}", how_missed(total), by_dag(dags), late_end_to_end(dags)));
   }
   const std::string open = total.in_flight > 0 ? fmt::format(" ({} still in progress)", total.in_flight) : "";
-  const std::string jobs = fmt::format("{}{}, none late, none lost.", jobs_text(total.released), open);
+  const std::string jobs = fmt::format("{}{}, none late, none lost.", plural(total.released, "job"), open);
   if (!has_misses(total, dags)) return verdict(true, true, "Every deadline was met", jobs);
   return verdict(true, false, "Every job met its own deadline, but end-to-end deadlines were missed",
                  jobs + late_end_to_end(dags));

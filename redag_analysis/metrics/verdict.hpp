@@ -7,7 +7,6 @@
 
 #include <span>
 #include <string>
-#include <vector>
 
 #include "redag_analysis/metrics/summary.hpp"
 
@@ -25,8 +24,5 @@ struct DeadlineVerdict {
 
 /// True if any deadline was missed, end-to-end deadlines included.
 [[nodiscard]] bool has_misses(const JobCounts &total, std::span<const DagSummary> dags);
-
-/// "a, b and c".
-[[nodiscard]] std::string join(const std::vector<std::string> &names);
 
 }  // namespace redag::metrics

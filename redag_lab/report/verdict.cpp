@@ -9,13 +9,10 @@
 
 #include "redag/base/check.hpp"
 #include "redag/base/text.hpp"
+#include "redag/base/words.hpp"
 
 namespace redag::report {
 namespace {
-
-std::string plural(std::uint64_t count, const std::string &noun) {
-  return fmt::format("{} {}{}", format_count(count), noun, count == 1 ? "" : "s");
-}
 
 // Without a miss: how close it was.
 std::string closest(const Group &group) {
@@ -37,13 +34,6 @@ metrics::DeadlineVerdict deadlines_of(const Group &group) {
 Sentence on_deadlines(const Group &group) {
   const metrics::DeadlineVerdict verdict = deadlines_of(group);
   return {tone_of(verdict), verdict.is_met ? verdict.text + closest(group) : verdict.text};
-}
-
-std::string first_of(std::vector<std::string> names, std::size_t most) {
-  const std::size_t more = names.size() > most ? names.size() - most : 0;
-  names.resize(names.size() - more);
-  if (more > 0) names.push_back(format_count(more) + " more");
-  return join(names);
 }
 
 Sentence on_bounds(const Group &group) {
@@ -73,7 +63,7 @@ Sentence on_bounds(const Group &group) {
   }
   if (!above.empty()) {
     return {Tone::Bad,
-            fmt::format("Above the bound: {}. {}", first_of(above, 3),
+            fmt::format("Above the bound: {}. {}", join_first(above, 3),
                         simulated ? "A bound was exceeded in virtual time: either the bound or the simulation is wrong."
                                   : "An assumption of the bound does not hold.")};
   }
@@ -84,11 +74,11 @@ Sentence on_bounds(const Group &group) {
   if (bounds.schedulable && metrics::has_misses(group.total(), group.dags())) {
     return {Tone::Caution, fmt::format("Analysis ({}): every deadline is met, by {}, if its assumptions hold. This run "
                                        "missed deadlines, so they did not hold.{}",
-                                       bounds.assumes, first_of(bounds.by, 2), within)};
+                                       bounds.assumes, join_first(bounds.by, 2), within)};
   }
   if (bounds.schedulable) {
     return {Tone::Good, fmt::format("Analysis ({}): every deadline is met, by {}.{}", bounds.assumes,
-                                    first_of(bounds.by, 2), within)};
+                                    join_first(bounds.by, 2), within)};
   }
   return {Tone::Plain,
           fmt::format("Analysis ({}): not every deadline is shown to be met; bounds are safe, not exact.{}",
@@ -109,7 +99,7 @@ void add_assumptions(const Group &group, std::vector<Sentence> &sentences) {
   }
   if (!notes.empty()) {
     sentences.push_back({Tone::Plain, fmt::format("No alarm; the machine's noise may explain these deviations: {}.",
-                                                  first_of(notes, 3))});
+                                                  join_first(notes, 3))});
   }
 }
 

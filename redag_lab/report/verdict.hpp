@@ -15,8 +15,6 @@
 
 namespace redag::report {
 
-using metrics::join;
-
 enum class Tone : std::uint8_t { Good, Bad, Caution, Plain };
 
 [[nodiscard]] const char *to_string(Tone tone);

@@ -10,6 +10,7 @@
 
 #include "redag/base/rounded_time.hpp"
 #include "redag/base/text.hpp"
+#include "redag/base/words.hpp"
 #include "redag/trace/trace.hpp"
 #include "redag_analysis/text/table.hpp"
 #include "redag_lab/search/remedy.hpp"
@@ -138,10 +139,6 @@ std::string exploration_text(const lab::Analysed &analysed, const StreamTraits &
     return fmt::format("no exploration: {}\n", reason != nullptr ? reason->reason : report.bound()->figures);
   }
   return {};
-}
-
-std::string plural(std::size_t count, const char *noun) {
-  return fmt::format("{} {}{}", format_count(count), noun, count == 1 ? "" : "s");
 }
 
 std::string headline(const lab::Analysed &analysed) {

@@ -8,6 +8,7 @@
 #include <algorithm>
 
 #include "redag/base/text.hpp"
+#include "redag/base/words.hpp"
 #include "redag_analysis/text/table.hpp"
 
 namespace redag::cli {
@@ -140,7 +141,7 @@ std::string caveat(const lab::Comparison &comparison) {
   return fmt::format(
       "{} had real-time (SCHED_FIFO) threads, {} had not: on a busy machine, this alone explains part of the "
       "difference; mte-fifo and ste-fifo, or --realtime, give real-time threads to all executors",
-      report::join(with), report::join(without));
+      join(with), join(without));
 }
 
 std::string describe(const lab::Comparison &comparison, const StreamTraits &terminal) {

@@ -7,6 +7,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "redag/base/words.hpp"
 #include "redag_analysis/sim/simulator.hpp"
 #include "redag_analysis/text/tint.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
@@ -46,10 +47,6 @@ Facts facts_of(const Workload &workload) {
   return facts;
 }
 
-std::string plural(std::size_t count, const char *stem, const char *many = "s", const char *one = "") {
-  return fmt::format("{} {}{}", count, stem, count == 1 ? one : many);
-}
-
 std::string describe(const Facts &facts) {
   const std::string unknown = facts.without_wcet == 0 ? "" : fmt::format(" ({} without wcet)", facts.without_wcet);
   return fmt::format("{}, {}{}, {}, utilization {:.3f} on {} ({:.1f} %), hyperperiod {}", plural(facts.dags, "DAG"),
@@ -74,9 +71,9 @@ std::string describe(const robot::Robot &robot) {
   std::size_t cpus = 0;
   for (const robot::CpuSet &set : robot.cpu_sets) cpus += set.cpus.size();
   return fmt::format("robot of {} on {}, {}, {} of threads, {} of irqs",
-                     plural(robot.processes.size(), "process", "es"), plural(cpus, "processor"),
-                     plural(robot.links.size(), "link"), plural(robot.threads.size(), "entr", "ies", "y"),
-                     plural(robot.interrupts.size(), "entr", "ies", "y"));
+                     plural(robot.processes.size(), "process", "processes"), plural(cpus, "processor"),
+                     plural(robot.links.size(), "link"), plural(robot.threads.size(), "entry", "entries"),
+                     plural(robot.interrupts.size(), "entry", "entries"));
 }
 
 // A sound robot may have no workload that says what it does: `redag arrange` takes it all the same.
