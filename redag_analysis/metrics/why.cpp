@@ -64,6 +64,24 @@ CulpritKey culprit_key(const Part &part) {
   return {part.cause, is_own ? part.job.task : part.by.task, part.program};
 }
 
+// Why a job was lost; Unknown: nothing more than where its time went.
+Cause cause_of_loss(const JobRecord &job) {
+  if (!is_lost(job)) return Cause::Unknown;
+  switch (job.reason) {
+    case Reason::Exception: return Cause::Threw;
+    case Reason::Budget: return Cause::BudgetUsed;
+    case Reason::QueueFull: return Cause::QueueFull;
+    case Reason::DagFull: return Cause::PendingFull;
+    case Reason::Degraded: return Cause::Degraded;
+    case Reason::Removed: return Cause::Removed;
+    case Reason::None:
+    case Reason::Overrun:
+    case Reason::Precedence:
+    case Reason::NoData: break;
+  }
+  return Cause::Unknown;
+}
+
 bool costs_more(const Culprit &a, const Culprit &b) {
   if (is_work(a.cause) != is_work(b.cause)) return is_work(b.cause);
   if (a.main != b.main) return a.main > b.main;
@@ -146,7 +164,7 @@ class Investigation::Surveyor {
     ++survey_.counted;
     const Miss miss = of_.miss_of(job);
     const bool end_to_end = miss == Miss::EndToEnd;
-    if (miss != Miss::None) ++survey_.missed;
+    if (miss != Miss::None) ++(end_to_end ? survey_.late_end_to_end : survey_.missed);
     if (miss == Miss::Lost) {
       const Ranked one{0, job.sequence, {id_of(job), false}};
       lost_.add(one);
@@ -383,13 +401,48 @@ std::vector<Culprit> culprits_of(std::span<const Part> parts) {
   return culprits;
 }
 
+std::vector<Culprit> culprits_of(const Explanation &explanation) {
+  std::vector<Culprit> culprits = culprits_of(explanation.parts);
+  for (Culprit &one : culprits) {
+    one.longest = one.time;
+    one.delayed = explanation.job.task;
+  }
+  const Cause loss = cause_of_loss(explanation.job);
+  if (loss == Cause::Unknown) return culprits;
+  if (!culprits.empty()) culprits.front().main = 0;
+  Culprit lost;
+  lost.cause = loss;
+  lost.task = lost.delayed = explanation.job.task;
+  lost.jobs = lost.main = 1;
+  culprits.insert(culprits.begin(), std::move(lost));
+  return culprits;
+}
+
+std::optional<MainCause> main_cause_of(std::span<const Culprit> culprits) {
+  std::map<Cause, MainCause> kinds;
+  for (const Culprit &one : culprits) {
+    if (one.main == 0) continue;
+    MainCause &kind = kinds[one.cause];
+    kind.jobs += one.main;
+    kind.culprits.push_back(one);
+  }
+  const auto most = std::max_element(kinds.begin(), kinds.end(),
+                                     [](const auto &a, const auto &b) { return a.second.jobs < b.second.jobs; });
+  if (most == kinds.end()) return std::nullopt;
+  return std::move(most->second);
+}
+
 void CulpritCount::add(const Explanation &explanation) {
-  for (const Culprit &one : culprits_of(explanation.parts)) {
+  for (const Culprit &one : culprits_of(explanation)) {
     Culprit &culprit = found_[{one.cause, one.task, one.program}];
     std::tie(culprit.cause, culprit.task, culprit.program) = std::tie(one.cause, one.task, one.program);
     culprit.jobs += one.jobs;
     culprit.main += one.main;
     culprit.time += one.time;
+    if (one.longest > culprit.longest || !culprit.delayed.valid()) {
+      culprit.longest = one.longest;
+      culprit.delayed = one.delayed;
+    }
   }
 }
 

@@ -55,7 +55,9 @@ struct Culprit {
   std::string program;   // as Part::program
   std::size_t jobs = 0;  // explained jobs that it delayed
   std::size_t main = 0;  // of these, jobs that it delayed most
-  Duration time = 0;
+  Duration time = 0;     // in all of them
+  Duration longest = 0;  // in one of them
+  TaskId delayed;        // the task of that one
 
   friend bool operator==(const Culprit &, const Culprit &) = default;
 };
@@ -86,9 +88,11 @@ class Investigation {
                                                 std::size_t most = std::numeric_limits<std::size_t>::max());
 
   [[nodiscard]] const trace::RunInfo &run() const { return run_.info(); }
-  /// The number of jobs that were not released during the warm-up, and how many of them missed a deadline.
+  /// The number of jobs that were not released during the warm-up; how many of them were late or lost, as
+  /// JobCounts::missed(); and how many others missed only the end-to-end deadline of their DAG (Miss::EndToEnd).
   [[nodiscard]] std::uint64_t counted() const { return survey_.counted; }
   [[nodiscard]] std::uint64_t missed() const { return survey_.missed; }
+  [[nodiscard]] std::uint64_t late_end_to_end() const { return survey_.late_end_to_end; }
 
   /// The jobs that missed a deadline: the latest first, relative to the deadline; then lost ones. Those released during
   /// the warm-up do not count. One that misses only its DAG's deadline is to be explained end to end.
@@ -124,6 +128,7 @@ class Investigation {
   struct Survey {
     std::uint64_t counted = 0;
     std::uint64_t missed = 0;
+    std::uint64_t late_end_to_end = 0;
     std::vector<Subject> misses;
     std::vector<WorstOfTask> tasks;  // by TaskId
   };
@@ -143,6 +148,19 @@ class Investigation {
 /// The culprits of one job's parts: parts of one cause and one task or program together, the largest first. Work
 /// (is_work()) comes last.
 [[nodiscard]] std::vector<Culprit> culprits_of(std::span<const Part> parts);
+
+/// The culprits of one job, its main cause first: the largest one, or why the job was lost where that says more
+/// (an exception, a full queue).
+[[nodiscard]] std::vector<Culprit> culprits_of(const Explanation &explanation);
+
+/// The kind of cause that delayed most jobs most, with its culprits.
+struct MainCause {
+  std::size_t jobs = 0;
+  std::vector<Culprit> culprits;  // of one cause, the one that delayed most jobs most first; not empty
+};
+
+/// Chooses among the culprits of several jobs, as CulpritCount::sorted() returns them. None if no job has a cause.
+[[nodiscard]] std::optional<MainCause> main_cause_of(std::span<const Culprit> culprits);
 
 /// Adds up the culprits of several jobs.
 class CulpritCount {

@@ -33,6 +33,12 @@ const char *to_string(Cause cause) {
     case Cause::Interrupt: return "interrupt";
     case Cause::Throttled: return "throttled";
     case Cause::Slept: return "slept";
+    case Cause::Threw: return "threw";
+    case Cause::BudgetUsed: return "budget_used";
+    case Cause::QueueFull: return "queue_full";
+    case Cause::PendingFull: return "pending_full";
+    case Cause::Degraded: return "degraded";
+    case Cause::Removed: return "removed";
     case Cause::Unknown: return "unknown";
   }
   return "?";

@@ -35,14 +35,21 @@ enum class Cause : std::uint8_t {
   Preempted,     // it had lost its worker to another job
   DeviceQueue,   // it waited for a device, which served another job
   Waited,        // a device served it, or it waited for something else without a worker
-  OffProcessor,  // it had a worker and did not execute; the trace does not tell why
-  OnWorker,      // it had a worker; the trace does not tell whether it executed
+  OffProcessor,  // it had a worker and did not execute; the record does not show why
+  OnWorker,      // it had a worker; the record does not show whether it executed
   // With the kernel's record
   OtherProgram,  // another program had the processor
   OwnThread,     // another thread of its own process had it
   Interrupt,     // the kernel served an interrupt there
   Throttled,     // its thread is a real-time one, and the kernel gave the processor to an ordinary one
   Slept,         // its body waited in the kernel
+  // Lost for a reason that is not where its time went
+  Threw,        // its body threw
+  BudgetUsed,   // it was cut off at its budget, or skipped because an earlier job had used it
+  QueueFull,    // queue_depth jobs of its task were waiting
+  PendingFull,  // max_pending jobs of its DAG were waiting
+  Degraded,     // its DAG was degraded in HI mode
+  Removed,      // its task or DAG was removed
   Unknown,
 };
 

@@ -306,6 +306,18 @@ TEST(Why, WithoutAMissThereAreTheJobsClosestToTheirDeadlines) {
 }
 
 // One callback runs after the other, and max_active of the workload is no reason.
+// Each job meets its own deadline of 10 ms. The chain takes 4 ms, and its deadline is 3 ms.
+TEST(Why, JobsLateEndToEndOnlyAreCountedApart) {
+  Workload workload = make_workload({make_dag("d", {{"a", 10, 2}, {"b", 0, 2, {0}}})});
+  workload.dags[0].deadline = 3 * kMillisecond;
+  const trace::Trace trace = simulated(testing::run_info(workload), 50 * kMillisecond);
+  const Investigation investigation = Investigation::of(trace).value();
+  EXPECT_EQ(investigation.counted(), 10U);
+  EXPECT_EQ(investigation.missed(), 0U);
+  EXPECT_EQ(investigation.late_end_to_end(), 5U);
+  EXPECT_EQ(investigation.misses().size(), 5U);
+}
+
 TEST(Why, OtherExecutorsHaveNoMaxActiveAndNoOrder) {
   Workload workload = make_workload({make_dag("d", {{"a", 10, 3}, {"b", 10, 2}})}, 1, PreemptionMode::None);
   workload.dags[0].max_active = 1;
@@ -338,12 +350,12 @@ TEST(Why, ThreadsShowLateReleasesWakeupsAndTimeWithoutExecution) {
       on_threads().at(13).executed("a", 0, 0, 5).finished("a", 0, 0).at(14).released_for("b", 0, 13).ready("b", 0, 0));
   EXPECT_EQ(to_text(trace, explain_all(trace)[0]),
             "d.a#0 met its deadline of 100ms with 87ms to spare\n"
-            "1000000 its release was seen late\n"
+            "1000000 its timer fired late\n"
             "1000000 unknown\n"
-            "1000000 its thread had not begun the body yet\n"
+            "1000000 its thread woke up late\n"
             "2000000 executed\n"
             "3000000 executed beyond its wcet of 2ms\n"
-            "5000000 had a worker and did not execute (the trace does not tell why)\n");
+            "5000000 stood still: its body waited, or another program ran\n");
   EXPECT_EQ(explain_all(trace)[1].parts.front().cause, Cause::HandOver);
 }
 
@@ -383,10 +395,10 @@ TEST(Why, TheKernelsRecordNamesTheOtherProgram) {
   };
   EXPECT_EQ(text(kernel_rows(120)),
             "d.a#0 met its deadline of 100ms with 87ms to spare\n"
-            "1000000 its release was seen late\n"
+            "1000000 its timer fired late\n"
             "1000000 unknown\n"
             "500000 another program had the processor: stress-77\n"
-            "500000 its thread had not begun the body yet\n"
+            "500000 its thread woke up late\n"
             "2000000 executed\n"
             "2000000 another program had the processor: stress-77\n"
             "1000000 executed beyond its wcet of 2ms\n"

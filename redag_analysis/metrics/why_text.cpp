@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "redag/base/text.hpp"
+#include "redag/base/words.hpp"
 #include "redag/trace/trace.hpp"
 
 namespace redag::metrics {
@@ -26,8 +27,8 @@ const Task *task_of(const Workload &workload, TaskId task) {
 // `by` is the culprit with its rate, `own` the job that did not end, with its name only if it is not the explained one.
 std::string words(Cause cause, const std::string &by, const std::string &program) {
   switch (cause) {
-    case Cause::ReleaseLate: return "its release was seen late";
-    case Cause::HandOver: return "its data was there and not yet passed on";
+    case Cause::ReleaseLate: return "its timer fired late";
+    case Cause::HandOver: return "the executor had not passed its data on yet";
     case Cause::Sampling: return "its data waited for its next release";
     case Cause::Unreleased: return "was not released yet";
     case Cause::Predecessor:
@@ -39,26 +40,57 @@ std::string words(Cause cause, const std::string &by, const std::string &program
     case Cause::Queued: return fmt::format("queued behind {}", by);
     case Cause::Blocked: return fmt::format("blocked by {}, less urgent", by);
     case Cause::Demoted: return fmt::format("demoted, behind {}", by);
-    case Cause::Wakeup: return "its thread had not begun the body yet";
+    case Cause::Wakeup: return "its thread woke up late";
     case Cause::Execution: return "executed";
     case Cause::Overrun: return "executed beyond its wcet";
     case Cause::Overhead: return "simulated overheads";
     case Cause::Preempted: return fmt::format("preempted; {} ran", by);
     case Cause::DeviceQueue: return fmt::format("its device served {}", by);
-    case Cause::Waited: return "waited without a worker, as its task does";
-    case Cause::OffProcessor: return "had a worker and did not execute (the trace does not tell why)";
-    case Cause::OnWorker: return "had a worker (the trace does not tell whether it executed)";
+    case Cause::Waited: return "waited without a worker, as the workload says";
+    case Cause::OffProcessor: return "stood still: its body waited, or another program ran";
+    case Cause::OnWorker: return "had a worker; its processor time is not known";
     case Cause::OtherProgram: return fmt::format("another program had the processor: {}", program);
     case Cause::OwnThread: return fmt::format("another thread of this program had the processor: {}", program);
     case Cause::Interrupt: return fmt::format("the kernel served an interrupt: {}", program);
     case Cause::Throttled: return fmt::format("real-time threads were throttled; {} had the processor", program);
     case Cause::Slept: return "its body waited in the kernel";
+    case Cause::Threw: return "its body threw an exception";
+    case Cause::BudgetUsed: return "its budget was used up";
+    case Cause::QueueFull: return "its queue was full";
+    case Cause::PendingFull: return "its DAG had max_pending jobs waiting";
+    case Cause::Degraded: return "its DAG was degraded in HI mode";
+    case Cause::Removed: return "its task was removed";
     case Cause::Unknown: break;
   }
   return "unknown";
 }
 
+// True for a cause that the named task has in itself.
+bool is_of_named(Cause cause) {
+  switch (cause) {
+    case Cause::Unreleased:
+    case Cause::Execution:
+    case Cause::Overrun:
+    case Cause::Overhead:
+    case Cause::OffProcessor:
+    case Cause::OnWorker:
+    case Cause::Slept:
+    case Cause::Wakeup:
+    case Cause::Threw:
+    case Cause::BudgetUsed:
+    case Cause::QueueFull:
+    case Cause::PendingFull:
+    case Cause::Degraded:
+    case Cause::Removed: return true;
+    default: return false;
+  }
+}
+
 }  // namespace
+
+std::string name_of(const Culprit &culprit, const Workload &workload) {
+  return culprit.task.valid() ? trace::task_name(workload, culprit.task) : culprit.program;
+}
 
 std::string job_name(const Workload &workload, const JobId &job) {
   return fmt::format("{}#{}", trace::task_name(workload, job.task), job.number);
@@ -84,20 +116,25 @@ std::string describe(const PartRow &row, const Workload &workload, const JobId &
                      humanize_duration(main.time));
 }
 
+std::string describe(Cause cause, const std::string &name) {
+  const std::string text = words(cause, name, name);
+  return is_of_named(cause) && !name.empty() ? name + ": " + text : text;
+}
+
 std::string describe(const Culprit &culprit, const Workload &workload) {
-  const std::string name = culprit.task.valid() ? trace::task_name(workload, culprit.task) : "";
-  const std::string text = words(culprit.cause, name, culprit.program);
-  switch (culprit.cause) {
-    case Cause::Unreleased:
-    case Cause::Execution:
-    case Cause::Overrun:
-    case Cause::Overhead:
-    case Cause::OffProcessor:
-    case Cause::OnWorker:
-    case Cause::Slept:
-    case Cause::Wakeup: return name + ": " + text;
-    default: return text;
+  return describe(culprit.cause, name_of(culprit, workload));
+}
+
+std::string describe(const MainCause &main, const Workload &workload) {
+  constexpr std::size_t kMostNamed = 3;
+  std::vector<std::string> names;
+  for (const Culprit &one : main.culprits) {
+    std::string name = name_of(one, workload);
+    if (name.empty()) return describe(main.culprits.front().cause, {});
+    if (main.culprits.size() > 1) name += fmt::format(" ({})", format_count(one.main));
+    names.push_back(std::move(name));
   }
+  return describe(main.culprits.front().cause, join_first(std::move(names), kMostNamed));
 }
 
 std::string headline(const Explanation &explanation, const Workload &workload) {

@@ -20,8 +20,15 @@ namespace redag::metrics {
 /// As above; of several parts for example "63 shorter parts, mainly queued behind perception.detect (1.2ms)".
 [[nodiscard]] std::string describe(const PartRow &row, const Workload &workload, const JobId &explained);
 
-/// For example "queued behind perception.detect".
+/// The name of the task, thread or interrupt that delayed jobs; empty: none is known.
+[[nodiscard]] std::string name_of(const Culprit &culprit, const Workload &workload);
+
+/// For example "queued behind perception.detect", of the culprit with that name.
+[[nodiscard]] std::string describe(Cause cause, const std::string &name);
 [[nodiscard]] std::string describe(const Culprit &culprit, const Workload &workload);
+
+/// The same of several culprits, with their jobs: "queued behind perception.detect (12), log.flush (2) and 1 other".
+[[nodiscard]] std::string describe(const MainCause &main, const Workload &workload);
 
 /// For example "control.ekf#12 missed its deadline of 5ms by 1.2ms".
 [[nodiscard]] std::string headline(const Explanation &explanation, const Workload &workload);

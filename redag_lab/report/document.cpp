@@ -12,6 +12,7 @@
 
 #include "redag/base/check.hpp"
 #include "redag/base/text.hpp"
+#include "redag/base/words.hpp"
 #include "redag/trace/run_info_json.hpp"
 #include "redag/version.hpp"
 #include "redag_analysis/metrics/miss.hpp"
@@ -239,7 +240,7 @@ class GroupWriter {
                 {"worst_run", group_.worst_run()},
                 {"timeline", to_json(group_.timeline())},
                 {"schedule", to_json(group_.schedule(), group_.info())},
-                {"why", Json::parse(report::to_json(group_.why(), group_.workload()))}};
+                {"why", Json::parse(report::to_json(group_.why(), group_.info()))}};
   }
 
  private:

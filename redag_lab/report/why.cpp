@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "redag_analysis/metrics/why_remedy.hpp"
 #include "redag_analysis/metrics/why_text.hpp"
 
 namespace redag::report {
@@ -23,7 +24,15 @@ constexpr std::size_t kClosest = 20;     // jobs that are shown without a miss
 constexpr std::size_t kMostCauses = 40;
 constexpr std::size_t kMostRows = 40;  // of parts of a job
 
-Json to_json(const metrics::Explanation &one, const Workload &workload) {
+// What to change against a miss; null of a job in time.
+Json remedy_of(const metrics::Explanation &one, const trace::RunInfo &run) {
+  const std::vector<metrics::Culprit> culprits = metrics::culprits_of(one);
+  if (one.miss == metrics::Miss::None || culprits.empty()) return {};
+  return metrics::remedy(culprits.front(), run);
+}
+
+Json to_json(const metrics::Explanation &one, const trace::RunInfo &run) {
+  const Workload &workload = run.workload;
   const metrics::JobId id{one.job.task, one.job.number};
   Json parts{
       {"begin_ns", Json::array()}, {"length_ns", Json::array()}, {"work", Json::array()}, {"text", Json::array()}};
@@ -33,15 +42,15 @@ Json to_json(const metrics::Explanation &one, const Workload &workload) {
     parts["work"].push_back(row.is_work() ? 1 : 0);
     parts["text"].push_back(metrics::describe(row, workload, id));
   }
-  return {{"task", id.task.value},        {"number", id.number},       {"missed", one.miss != metrics::Miss::None},
-          {"end_to_end", one.end_to_end}, {"length_ns", one.length()}, {"text", metrics::headline(one, workload)},
-          {"parts", std::move(parts)}};
+  return {{"task", id.task.value},         {"number", id.number},       {"missed", one.miss != metrics::Miss::None},
+          {"end_to_end", one.end_to_end},  {"length_ns", one.length()}, {"text", metrics::headline(one, workload)},
+          {"remedy", remedy_of(one, run)}, {"parts", std::move(parts)}};
 }
 
 WorstJob row_of(const metrics::Explanation &one, const trace::RunInfo &run) {
   WorstJob row{.job = one.job, .since = one.job.release - run.start, .lateness = {}, .main_cause = {}};
   if (one.miss != metrics::Miss::Lost) row.lateness = one.lateness();
-  const std::vector<metrics::Culprit> culprits = metrics::culprits_of(one.parts);
+  const std::vector<metrics::Culprit> culprits = metrics::culprits_of(one);
   if (!culprits.empty()) row.main_cause = culprits.front();
   return row;
 }
@@ -64,6 +73,15 @@ Json to_json(const std::vector<WorstJob> &worst, const Workload &workload) {
   return rows;
 }
 
+// Null if no deadline was missed.
+Json to_json(const std::optional<metrics::MainCause> &main, const trace::RunInfo &run) {
+  if (!main) return {};
+  return {{"cause", to_string(main->culprits.front().cause)},
+          {"jobs", main->jobs},
+          {"text", metrics::describe(*main, run.workload)},
+          {"remedy", metrics::remedy(*main, run)}};
+}
+
 }  // namespace
 
 Result<WhyDigest> why_of(const metrics::Investigation &investigation, const Schedule &schedule) {
@@ -74,7 +92,8 @@ Result<WhyDigest> why_of(const metrics::Investigation &investigation, const Sche
     for (const metrics::JobRecord &job : window.jobs) seen.insert({job.task, job.number});
   }
   WhyDigest why;
-  why.misses = investigation.missed();
+  why.missed = investigation.missed();
+  why.misses = why.missed + investigation.late_end_to_end();
   why.explained = subjects.size();
   why.worst.resize(std::min(kMostListed, subjects.size()));
   metrics::CulpritCount causes;
@@ -93,19 +112,24 @@ Result<WhyDigest> why_of(const metrics::Investigation &investigation, const Sche
   return why;
 }
 
-std::string to_json(const WhyDigest &why, const Workload &workload) {
+std::string to_json(const WhyDigest &why, const trace::RunInfo &run) {
+  const Workload &workload = run.workload;
   Json causes = Json::array();
   for (std::size_t i = 0; i < std::min(kMostCauses, why.causes.size()); ++i) {
     const metrics::Culprit &cause = why.causes[i];
     causes.push_back({{"text", metrics::describe(cause, workload)},
+                      {"remedy", metrics::remedy(cause, run)},
                       {"jobs", cause.jobs},
                       {"main", cause.main},
                       {"time_ns", cause.time}});
   }
   Json jobs = Json::array();
-  for (const metrics::Explanation &one : why.jobs) jobs.push_back(to_json(one, workload));
+  for (const metrics::Explanation &one : why.jobs) jobs.push_back(to_json(one, run));
   const Json document{{"misses", why.misses},
+                      {"missed", why.missed},
+                      {"late_end_to_end", why.misses - why.missed},
                       {"explained", why.explained},
+                      {"main_cause", to_json(why.misses == 0 ? std::nullopt : metrics::main_cause_of(why.causes), run)},
                       {"causes", std::move(causes)},
                       {"worst", to_json(why.worst, workload)},
                       {"jobs", std::move(jobs)}};

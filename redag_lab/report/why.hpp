@@ -25,7 +25,8 @@ struct WorstJob {
 };
 
 struct WhyDigest {
-  std::uint64_t misses = 0;
+  std::uint64_t misses = 0;   // jobs that missed any deadline
+  std::uint64_t missed = 0;   // of these, the late and lost ones; the others missed only the DAG's deadline
   std::size_t explained = 0;  // misses that the causes cover
   std::vector<metrics::Culprit> causes;
   std::vector<WorstJob> worst;             // all misses up to a limit, the worst first; without a miss the closest jobs
@@ -36,6 +37,6 @@ struct WhyDigest {
 [[nodiscard]] Result<WhyDigest> why_of(const metrics::Investigation &investigation, const Schedule &schedule);
 
 /// Returns the object `why` of a group (docs/results_format.md) as JSON.
-[[nodiscard]] std::string to_json(const WhyDigest &why, const Workload &workload);
+[[nodiscard]] std::string to_json(const WhyDigest &why, const trace::RunInfo &run);
 
 }  // namespace redag::report

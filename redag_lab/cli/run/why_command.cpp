@@ -67,7 +67,8 @@ class Explaining {
     const std::vector<metrics::Subject> subjects =
         investigation.misses().empty() ? investigation.closest(kClosest) : investigation.misses();
     WhyOverview overview;
-    overview.misses = investigation.missed();
+    overview.missed = investigation.missed();
+    overview.late_end_to_end = investigation.late_end_to_end();
     overview.jobs = investigation.counted();
     overview.explained = subjects.size();
     overview.explanations.resize(options_.all || options_.json ? subjects.size() : std::min(kRows, subjects.size()));
@@ -105,7 +106,8 @@ class Explaining {
     if (!explained) return tl::unexpected<Diagnostics>(explained.error());
     const metrics::Explanation &one = overview.explanations.front();
     overview.explained = 1;
-    overview.misses = one.miss == metrics::Miss::None ? 0 : 1;
+    overview.late_end_to_end = one.miss == metrics::Miss::EndToEnd ? 1 : 0;
+    overview.missed = one.miss == metrics::Miss::None ? 0 : 1 - overview.late_end_to_end;
     overview.jobs = 1;
     metrics::CulpritCount causes;
     causes.add(one);

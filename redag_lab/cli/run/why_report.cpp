@@ -6,8 +6,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "redag/base/text.hpp"
+#include "redag/base/words.hpp"
+#include "redag_analysis/metrics/why_remedy.hpp"
 #include "redag_analysis/metrics/why_text.hpp"
 #include "redag_analysis/text/table.hpp"
 #include "redag_analysis/text/wrap.hpp"
@@ -38,11 +41,30 @@ std::string line(const std::string &since, Duration length, Duration whole, cons
 
 Tint tint_of(const Explanation &one) { return one.miss == metrics::Miss::None ? Tint::Good : Tint::Bad; }
 
-// How late a job was, or that it was lost.
-std::string lateness(const Explanation &one) {
+// How late a job was, or why it was lost; of a job that met its deadline the slack.
+std::string margin(const Explanation &one) {
   if (one.miss == metrics::Miss::Lost) return to_string(one.job.reason);
-  const Duration late = one.lateness();
-  return (late < 0 ? "-" : "") + humanize_duration(late < 0 ? -late : late);
+  return humanize_duration(one.miss == metrics::Miss::None ? -one.lateness() : one.lateness());
+}
+
+// Empty of a job in time.
+std::string remedy_of(const Explanation &one, const trace::RunInfo &run) {
+  const std::vector<Culprit> culprits = metrics::culprits_of(one);
+  return one.miss == metrics::Miss::None || culprits.empty() ? "" : metrics::remedy(culprits.front(), run);
+}
+
+std::string what_to_change(const std::string &remedy, const StreamTraits &terminal) {
+  return remedy.empty() ? std::string() : wrapped("What to change: " + remedy, 0, terminal.width);
+}
+
+// The first lines of a run with misses: the kind of cause that delayed most jobs most, and what to do about it.
+std::string main_cause(const WhyOverview &overview, const trace::RunInfo &run, const StreamTraits &terminal) {
+  if (overview.misses() == 0) return {};
+  const std::optional<metrics::MainCause> main = metrics::main_cause_of(overview.causes);
+  if (!main) return {};
+  const std::string words = fmt::format("Main cause of {} of {}: {}", format_count(main->jobs),
+                                        format_count(overview.explained), metrics::describe(*main, run.workload));
+  return wrapped(words, 0, terminal.width) + what_to_change(metrics::remedy(*main, run), terminal);
 }
 
 std::string causes_table(const std::vector<Culprit> &causes, const trace::RunInfo &run, const StreamTraits &terminal) {
@@ -57,19 +79,41 @@ std::string causes_table(const std::vector<Culprit> &causes, const trace::RunInf
                {humanize_duration(cause.time)}});
   }
   std::string text = table.render(terminal.width, terminal.colour);
-  if (causes.size() > kMostCauses) text += fmt::format("(and {} others)\n", format_count(causes.size() - kMostCauses));
+  if (causes.size() > kMostCauses) text += fmt::format("(and {})\n", plural(causes.size() - kMostCauses, "other"));
   return text + "jobs: delayed by this cause; mainly: delayed by it more than by any other\n";
 }
 
-Json to_json(const Culprit &cause, const Workload &workload) {
+Json or_null(const std::string &text) { return text.empty() ? Json() : Json(text); }
+
+std::string headline_of(const WhyOverview &overview) {
+  if (overview.misses() == 0) return "no deadline was missed; the jobs that came closest:";
+  std::string text =
+      fmt::format("{} of {} missed their deadline", format_count(overview.missed), plural(overview.jobs, "job"));
+  if (overview.late_end_to_end > 0) {
+    text += fmt::format("; {} only the end-to-end deadline", format_count(overview.late_end_to_end));
+  }
+  return text;
+}
+
+Json to_json(const Culprit &cause, const trace::RunInfo &run) {
+  const Workload &workload = run.workload;
   Json row{{"cause", to_string(cause.cause)},
            {"task", cause.task.valid() ? Json(trace::task_name(workload, cause.task)) : Json()},
-           {"program", cause.program.empty() ? Json() : Json(cause.program)},
+           {"program", or_null(cause.program)},
            {"text", metrics::describe(cause, workload)},
+           {"remedy", or_null(metrics::remedy(cause, run))},
            {"jobs", cause.jobs},
            {"main", cause.main},
            {"time_ns", cause.time}};
   return row;
+}
+
+Json to_json(const std::optional<metrics::MainCause> &main, const trace::RunInfo &run) {
+  if (!main) return {};
+  return Json{{"cause", to_string(main->culprits.front().cause)},
+              {"jobs", main->jobs},
+              {"text", metrics::describe(*main, run.workload)},
+              {"remedy", or_null(metrics::remedy(*main, run))}};
 }
 
 Json to_json(const Explanation &one, const trace::RunInfo &run) {
@@ -79,13 +123,14 @@ Json to_json(const Explanation &one, const trace::RunInfo &run) {
     parts.push_back(Json{{"cause", to_string(part.cause)},
                          {"job", name(part.job)},
                          {"by", name(part.by)},
-                         {"program", part.program.empty() ? Json() : Json(part.program)},
+                         {"program", or_null(part.program)},
                          {"begin_ns", part.begin == kNever ? Json() : Json(part.begin)},
                          {"length_ns", part.length},
                          {"text", metrics::describe(part, run.workload, id_of(one))}});
   }
   return Json{{"job", name(id_of(one))},
               {"text", metrics::headline(one, run.workload)},
+              {"remedy", or_null(remedy_of(one, run))},
               {"outcome", to_string(one.job.outcome)},
               {"missed", one.miss != metrics::Miss::None},
               {"end_to_end", one.end_to_end},
@@ -109,11 +154,15 @@ std::string describe(const Explanation &one, const trace::RunInfo &run, const St
                       : one.end_to_end                                 ? "end to end"
                                                                        : "response time";
   text += line("", one.length(), one.length(), whole, terminal);
-  const std::vector<Culprit> culprits = metrics::culprits_of(one.parts);
-  if (!culprits.empty() && !metrics::is_work(culprits.front().cause)) {
-    text += "\n" + wrapped(fmt::format("Main cause: {} ({} of {})", metrics::describe(culprits.front(), run.workload),
-                                       humanize_duration(culprits.front().time), humanize_duration(one.length())),
-                           0, terminal.width);
+  const std::vector<Culprit> culprits = metrics::culprits_of(one);
+  if (!culprits.empty() && (one.miss != metrics::Miss::None || !metrics::is_work(culprits.front().cause))) {
+    const Culprit &main = culprits.front();
+    std::string words = "Main cause: " + metrics::describe(main, run.workload);
+    if (main.time > 0) {
+      words += fmt::format(" ({} of {})", humanize_duration(main.time), humanize_duration(one.length()));
+    }
+    text += "\n" + wrapped(words, 0, terminal.width);
+    text += what_to_change(remedy_of(one, run), terminal);
   }
   if (most > 0 && one.parts.size() > most) text += "(the longest parts; --all shows all)\n";
   return text;
@@ -121,22 +170,20 @@ std::string describe(const Explanation &one, const trace::RunInfo &run, const St
 
 std::string describe(const WhyOverview &overview, const trace::RunInfo &run, const StreamTraits &terminal) {
   const std::size_t count = overview.explained;
-  const std::string headline =
-      overview.misses == 0
-          ? std::string("no deadline was missed; the jobs that came closest:")
-          : fmt::format("{} of {} jobs missed a deadline", format_count(overview.misses), format_count(overview.jobs));
-  std::string text = tinted(headline, overview.misses == 0 ? Tint::Good : Tint::Bad, terminal.colour) + "\n";
-  if (overview.misses > count) text += fmt::format("(explained: the worst {})\n", format_count(count));
+  const std::string headline = headline_of(overview);
+  std::string text = tinted(headline, overview.misses() == 0 ? Tint::Good : Tint::Bad, terminal.colour) + "\n";
+  if (overview.misses() > count) text += fmt::format("(explained: the worst {})\n", format_count(count));
   if (count == 0) return text;
+  text += main_cause(overview, run, terminal);
   text += "\n" + causes_table(overview.causes, run, terminal) + "\n";
   Table table({{"job", false, 9},
-               {"late or lost", true, 8},
+               {overview.misses() == 0 ? "slack" : "late or lost", true, 8},
                {.title = "main cause", .importance = 7, .prose = true},
                {"share", true, 6}});
   for (const Explanation &one : overview.explanations) {
-    const std::vector<Culprit> culprits = metrics::culprits_of(one.parts);
+    const std::vector<Culprit> culprits = metrics::culprits_of(one);
     table.add({{metrics::job_name(run.workload, id_of(one))},
-               {lateness(one), tint_of(one)},
+               {margin(one), tint_of(one)},
                {culprits.empty() ? "lost at its release" : metrics::describe(culprits.front(), run.workload)},
                {culprits.empty() ? "-" : format_percent(share_of(culprits.front().time, one.length()))}});
   }
@@ -148,11 +195,18 @@ std::string describe(const WhyOverview &overview, const trace::RunInfo &run, con
 
 Json to_json(const WhyOverview &overview, const trace::RunInfo &run) {
   Json causes = Json::array();
-  for (const Culprit &cause : overview.causes) causes.push_back(to_json(cause, run.workload));
+  for (const Culprit &cause : overview.causes) causes.push_back(to_json(cause, run));
   Json jobs = Json::array();
   for (const Explanation &one : overview.explanations) jobs.push_back(to_json(one, run));
-  return Json{{"format", "redag.why/1"},   {"workload", run.workload.name}, {"executor", run.executor},
-              {"released", overview.jobs}, {"misses", overview.misses},     {"causes", std::move(causes)},
+  return Json{{"format", "redag.why/1"},
+              {"workload", run.workload.name},
+              {"executor", run.executor},
+              {"released", overview.jobs},
+              {"misses", overview.misses()},
+              {"missed", overview.missed},
+              {"late_end_to_end", overview.late_end_to_end},
+              {"main_cause", overview.misses() == 0 ? Json() : to_json(metrics::main_cause_of(overview.causes), run)},
+              {"causes", std::move(causes)},
               {"jobs", std::move(jobs)}};
 }
 

@@ -19,8 +19,12 @@ struct WhyOverview {
   std::vector<metrics::Explanation> explanations;  // to be shown; the worst first
   std::vector<metrics::Culprit> causes;            // of all that were explained
   std::size_t explained = 0;
-  std::uint64_t misses = 0;  // in all; not all need to be explained
-  std::uint64_t jobs = 0;    // released, those of the warm-up left out
+  std::uint64_t missed = 0;           // late or lost
+  std::uint64_t late_end_to_end = 0;  // others, which missed only the end-to-end deadline of their DAG
+  std::uint64_t jobs = 0;             // released, those of the warm-up left out
+
+  /// In all; not all need to be explained.
+  [[nodiscard]] std::uint64_t misses() const { return missed + late_end_to_end; }
 };
 
 /// Returns one job's parts in `most` lines (0: one for each part), and what they sum to.
