@@ -64,17 +64,19 @@ std::vector<WaitingTime> waiting_times(const Workload &workload) {
 
 std::string why_waits_are_not_covered(const TaskSet &task_set) {
   if (task_set.mode == sched::Preemption::Cooperative)
-    return "waits are covered without cooperative preemption points only";
-  if (!task_set.groups.empty()) return "a job that waits holds its group, for which no bound is known";
+    return "callbacks that wait (segments) have bounds only without cooperative preemption points";
+  if (!task_set.groups.empty())
+    return "callbacks that wait (segments) have bounds only without groups, which a job holds while it waits";
   for (std::size_t rank = 1; rank < task_set.by_rank.size(); ++rank) {
     const CompiledTask &upper = task_set.tasks[task_set.by_rank[rank - 1]];
     const CompiledTask &lower = task_set.tasks[task_set.by_rank[rank]];
     if (upper.level == lower.level && upper.tier != lower.tier)
-      return "waits are covered where tasks of different priority have different levels only";
+      return "callbacks that wait (segments) have bounds only if each priority has a level of its own";
   }
   if (task_set.platform.max_started > 0 && task_set.platform.max_started < task_set.tasks.size())
-    return "waits are covered with as many threads as tasks only";
-  if (task_set.has_rate_edges()) return "waits are covered without edges between rates only";
+    return "callbacks that wait (segments) have bounds only with as many threads as tasks";
+  if (task_set.has_rate_edges())
+    return "callbacks that wait (segments) have bounds only if no task takes data of a task with another period";
   for (const CompiledDag &dag : task_set.dags) {
     if (dag.max_active > 0 && dag.units.size() > 1)
       return "DAG '" + dag.name + "': a job that waits counts for max_active";

@@ -100,7 +100,8 @@ TEST(WaitingTimes, AreNotCoveredWhereNoProofIsKnown) {
   const AnalysisPlatform one = platform_of(three());
   AnalysisPlatform other = one;
   other.levels = 2;
-  expect_uncovered(three(), other, "waits are covered where tasks of different priority have different levels only");
+  expect_uncovered(three(), other,
+                   "callbacks that wait (segments) have bounds only if each priority has a level of its own");
   other.levels = 8;
   EXPECT_TRUE(compiled(three(), other).has_waits);
   other.max_started = 4;
@@ -110,15 +111,17 @@ TEST(WaitingTimes, AreNotCoveredWhereNoProofIsKnown) {
   workload.dags[0].tasks[0].waits = {Wait{1, 5, 0, {}}};
   other = platform_of(workload);
   other.max_started = 1;
-  expect_uncovered(workload, other, "waits are covered with as many threads as tasks only");
+  expect_uncovered(workload, other, "callbacks that wait (segments) have bounds only with as many threads as tasks");
   workload = three();
   workload.dags[0].tasks[0].region = 1;
   other = one;
   other.preemption = sched::Preemption::Cooperative;
-  expect_uncovered(workload, other, "waits are covered without cooperative preemption points only");
+  expect_uncovered(workload, other,
+                   "callbacks that wait (segments) have bounds only without cooperative preemption points");
   workload = three();
   workload.dags[0].tasks[0].group = workload.dags[1].tasks[0].group = "g";
-  expect_uncovered(workload, one, "a job that waits holds its group, for which no bound is known");
+  expect_uncovered(workload, one,
+                   "callbacks that wait (segments) have bounds only without groups, which a job holds while it waits");
 }
 
 }  // namespace

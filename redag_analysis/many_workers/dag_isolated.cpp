@@ -149,7 +149,7 @@ Outcome apply_isolated(const TaskSet &task_set) {
   }
   if (!any)
     return NotApplicable{
-        "no DAG has workers to itself: its max_active and those of interfering DAGs sum up to more than m"};
+        "no DAG has workers of its own: the max_active of a DAG and of those that delay it exceed the workers"};
   return from_units(task_set, std::move(responses));
 }
 

@@ -141,11 +141,11 @@ class SharedTerms {
                                          std::size_t from, std::uint32_t count);
 
 inline constexpr std::string_view kExceedsLimit =
-    "its response time exceeds the limit above which jobs would be skipped";
+    "its response time can reach the next release, which would skip a job";
 inline constexpr std::string_view kMoreUrgent = "a more urgent task or DAG has no bound";
 inline constexpr std::string_view kPeer = "a task or DAG of the same priority has no bound";
 inline constexpr std::string_view kNoFixedPoint =
-    "no fixed point was found within the allowed steps and below the limit above which jobs would be skipped";
+    "the analysis finds no response time that ends before the next release skips a job";
 
 /// Limits the evaluations of one fixed point; ordinary task sets need tens.
 inline constexpr int kMaxSteps = 10'000;

@@ -255,7 +255,7 @@ Outcome apply_dag(const TaskSet &task_set) {
   if (view.reason) return NotApplicable{*view.reason};
   AgainstAll all(task_set, view.units, view.workers);
   return global::all_that_agree(
-      task_set, view.units, "a DAG's response time can exceed its limit, on which the bounds of all others rely",
+      task_set, view.units, "a DAG's response time can reach its next release, and then no other bound holds",
       [&](std::size_t k) { return all.respond(k); }, [&](std::size_t k) { return all.explain(k); });
 }
 

@@ -141,7 +141,7 @@ Outcome apply_response(const TaskSet &task_set) {
   if (view.reason) return NotApplicable{*view.reason};
   Edf edf(task_set, view.units);
   return global::all_that_agree(
-      task_set, view.units, "a task's response time can exceed its limit, on which the bounds of all others rely",
+      task_set, view.units, "a task's response time can reach its next release, and then no other bound holds",
       [&](std::size_t k) { return edf.respond(k); }, [&](std::size_t k) { return edf.explain(k); });
 }
 

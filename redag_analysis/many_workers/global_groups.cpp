@@ -22,10 +22,11 @@ using groups::Chain;
 using groups::Question;
 
 constexpr std::string_view kOverlap = "its response time can exceed 16 of its periods";
-constexpr std::string_view kMixed = "instances overlap, and data of two instances can meet where paths of its DAG join";
+constexpr std::string_view kMixed =
+    "its DAG can be released again before it has ended, and old and new data can meet where its paths join";
 constexpr std::string_view kSkipped = "a job can wait for so long that the next release skips it";
 constexpr std::string_view kBindsNow =
-    "instances overlap so that its max_active binds, and it has groups and an overhead of preemption";
+    "its DAG can be released again before it has ended, with a max_active, groups and an overhead of preemption";
 constexpr int kMostRounds = 1000;
 
 // Whether a task may answer after its next release. It may not without preemption, nor where other bounds rely on whole

@@ -336,7 +336,7 @@ Outcome apply_sequential(const TaskSet &task_set) {
   }
   if (!possible) {
     ResponseBound none;
-    none.absent = "a task's response time can exceed its limit, on which the bounds of all others rely";
+    none.absent = "a task's response time can reach its next release, and then no other bound holds";
     return from_units(task_set, std::vector<ResponseBound>(task_set.units.size(), none));
   }
   std::vector<ResponseBound> responses(task_set.units.size());

@@ -57,7 +57,7 @@ Outcome bound_in_any_order(const TaskSet &task_set) {
     return result;
   };
   return global::all_that_agree(
-      task_set, units, "a DAG's response time can exceed its limit, on which the bounds of all others rely",
+      task_set, units, "a DAG's response time can reach its next release, and then no other bound holds",
       [&](std::size_t k) {
         return as_last(
             k, [&](std::size_t last) { return contention.respond(last, units[last].response - units[last].jitter); });

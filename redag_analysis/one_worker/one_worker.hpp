@@ -103,7 +103,7 @@ struct Response {
 
 /// Reasons for which a fixed point has no result.
 inline constexpr std::string_view kExceedsLimit =
-    "its response time exceeds the limit above which jobs would be skipped";
+    "its response time can reach the next release, which would skip a job";
 inline constexpr std::string_view kGaveUp = "gave up: the busy period is too long";
 
 struct FixedPoint {

@@ -81,8 +81,7 @@ class Executor {
         whose.push_back(t);
       }
     }
-    return global::agree(values,
-                         "a callback's response time can exceed its limit, on which the bounds of all others rely",
+    return global::agree(values, "a callback's response time can reach its next release, and then no other bound holds",
                          [&](std::size_t k) {
                            const std::uint32_t t = whose[k / 2];
                            if (k % 2 == 1) return respond(t);

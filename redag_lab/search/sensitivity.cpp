@@ -39,32 +39,39 @@ std::string why_no_bound(const analysis::Report &report, std::uint32_t task) {
   return "no method that bounds response times applies";
 }
 
-// Returns the reason why analyze() does not accept the workload.
-std::string obstacle_of(const Workload &workload, const analysis::AnalysisPlatform &platform) {
+struct Obstacle {
+  std::string what;
+  std::string reason = {};
+};
+
+// Returns why analyze() does not accept the workload.
+Obstacle obstacle_of(const Workload &workload, const analysis::AnalysisPlatform &platform) {
   const Result<analysis::TaskSet> task_set = analysis::compile(workload, platform);
-  if (!task_set) return task_set.error().front().message;
-  if (!task_set->not_analysable.empty() && !task_set->has_waits) return task_set->not_analysable;
-  if (const std::optional<std::string> why = why_impossible(*task_set)) return *why;
+  if (!task_set) return {task_set.error().front().message};
+  if (!task_set->not_analysable.empty() && !task_set->has_waits) {
+    return {"no method applies", task_set->not_analysable};
+  }
+  if (const std::optional<std::string> why = why_impossible(*task_set)) return {*why};
   const analysis::Report report = analysis::analyze(*task_set);
   std::optional<std::uint32_t> worst;
   Duration missing = 0;
   for (std::uint32_t t = 0; t < task_set->tasks.size(); ++t) {
     const analysis::CompiledTask &task = task_set->tasks[t];
     if (meets_deadline(task, report.tasks[t].bound)) continue;
-    if (!report.tasks[t].response) return task_set->tasks[t].name + ": " + why_no_bound(report, t);
+    if (!report.tasks[t].response) return {task_set->tasks[t].name + " has no bound", why_no_bound(report, t)};
     const Duration late = *report.tasks[t].response - std::min(task.deadline, task.limit);
     if (worst && late <= missing) continue;
     worst = t;
     missing = late;
   }
-  if (worst) return "the bound of " + task_set->tasks[*worst].name + " exceeds its deadline";
+  if (worst) return {"the bound of " + task_set->tasks[*worst].name + " exceeds its deadline"};
   for (std::size_t d = 0; d < task_set->dags.size(); ++d) {
     const analysis::CompiledDag &dag = task_set->dags[d];
     if (dag.deadline > 0 && report.dags[d].response.value_or(kNever) > dag.deadline) {
-      return "the end-to-end deadline of " + dag.name;
+      return {"the end-to-end deadline of " + dag.name};
     }
   }
-  return "not accepted";
+  return {"not accepted"};
 }
 
 // Searches the positions of one knob.
@@ -99,16 +106,21 @@ class SensitivitySearch {
     } else if (const std::optional<std::int64_t> start = light_start(); start && !stopped_) {
       between(*start, margin_.nominal);
     } else {
-      margin_.obstacle = obstacle_of(turned(workload_, margin_.knob, lightest()), platform_);
+      set_obstacle(obstacle_of(turned(workload_, margin_.knob, lightest()), platform_));
     }
     if (stopped_) return std::nullopt;
     if (margin_.position) {
       margin_.factor = load_factor(workload_, margin_.knob, *margin_.position);
       const bool at_end = margin_.knob.kind == Knob::Kind::Period && *margin_.position == -1;
-      margin_.obstacle = at_end ? "the resolution of the clock"
-                                : obstacle_of(turned(workload_, margin_.knob, *margin_.position + 1), platform_);
+      set_obstacle(at_end ? Obstacle{"the resolution of the clock"}
+                          : obstacle_of(turned(workload_, margin_.knob, *margin_.position + 1), platform_));
     }
     return margin_;
+  }
+
+  void set_obstacle(Obstacle obstacle) {
+    margin_.obstacle = std::move(obstacle.what);
+    margin_.reason = std::move(obstacle.reason);
   }
 
   bool accepts(std::int64_t position) {

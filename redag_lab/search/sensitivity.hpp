@@ -27,6 +27,7 @@ struct Margin {
   std::optional<std::int64_t> again;     // an accepted position above `position`: not monotone
   std::uint32_t tested = 0;              // positions
   std::string obstacle;                  // what fails at the next position: a clause without a final full stop
+  std::string reason;                    // why, where the analysis gives a reason of its own; also such a clause
 
   /// The load at `position` divided by the nominal load. Requires a position.
   double factor = 0;

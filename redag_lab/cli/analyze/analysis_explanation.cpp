@@ -121,9 +121,11 @@ std::string explain_bound(const lab::Analysed &analysed, const lab::Row &row, co
   std::string text = fmt::format("contributions to the bound by {}:\n", row.tightest.method->name) +
                      table.render(terminal.width, terminal.colour);
   if (terms.empty()) return text;
-  text += fmt::format("what to change: the largest contribution is {} of {} ({}): {}\n",
-                      humanize_duration(terms.front().amount), humanize_duration(response),
-                      format_percent(share(terms.front().amount, response)), advice(analysed, terms.front()));
+  const std::string largest =
+      fmt::format("the largest contribution is {} of {} ({})", humanize_duration(terms.front().amount),
+                  humanize_duration(response), format_percent(share(terms.front().amount, response)));
+  if (row.standing != lab::Standing::MayMiss) return text + largest + "; nothing needs to change\n";
+  text += fmt::format("what to change: {}: {}\n", largest, advice(analysed, terms.front()));
   if (row.slack.value_or(0) < 0)
     text += fmt::format("the bound exceeds the deadline by {}\n", humanize_duration(-*row.slack));
   return text;

@@ -5,6 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <map>
+
 #include "redag_lab/cli/analyze/sensitivity_report.hpp"
 #include "redag_testing/builders.hpp"
 
@@ -68,7 +71,41 @@ TEST(SensitivityReport, FactorsAreNeverRoundedUp) {
   EXPECT_EQ(knob_name(sensitivity.analysed, sensitivity.results[3].margin.knob), "wcet of b.t");
   EXPECT_EQ(to_json(sensitivity)["limits"][3]["limit_ns"], 14 * kMillisecond);
   sensitivity.results[2].margin.again = 9 * kMillisecond;
-  EXPECT_NE(in_words(sensitivity).find("not monotone: wcet of a.t is accepted again at 9ms"), std::string::npos);
+  EXPECT_NE(in_words(sensitivity).find("with gaps: wcet of a.t passes again at 9ms, above its limit"),
+            std::string::npos);
+}
+
+// A reason that limits many rows stands below the table once, and in the document with each.
+TEST(SensitivityReport, ReasonsStandBelowTheTableOnce) {
+  Workload workload = short_deadline();
+  for (Dag &dag : workload.dags) dag.tasks[0].budget = kMillisecond;  // below the wcet: no method applies
+  const analysis::AnalysisPlatform platform = analysis::platform_of(workload);
+  Sensitivity sensitivity;
+  sensitivity.analysed = lab::analyse(workload, platform).value();
+  for (const lab::Knob &knob : lab::knobs_of(workload, sensitivity.analysed.task_set)) {
+    sensitivity.results.push_back({lab::margin_of(workload, platform, knob).value(), {}});
+  }
+  sensitivity.knobs = sensitivity.results.size();
+  const std::string text = describe(sensitivity, {}, false);
+  std::map<std::string, std::size_t> rows;
+  for (const KnobResult &result : sensitivity.results) {
+    if (!result.margin.reason.empty()) ++rows[result.margin.reason];
+  }
+  const auto count = [&](const std::string &part) {
+    std::size_t found = 0;
+    for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++found;
+    return found;
+  };
+  ASSERT_EQ(rows.size(), 2U) << text;
+  std::size_t most = 0;
+  for (const auto &[reason, number] : rows) {
+    EXPECT_EQ(count(reason), 1U) << text;
+    most = std::max(most, number);
+  }
+  EXPECT_GT(most, 1U);
+  EXPECT_EQ(count("no method applies [1]") + count("no method applies [2]"), sensitivity.results.size() - 1) << text;
+  const Json rates = to_json(sensitivity)["limits"][1];
+  EXPECT_EQ(rates["obstacle"], "no method applies: " + sensitivity.results[1].margin.reason);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 
 #include "redag/base/rounded_time.hpp"
 #include "redag/base/text.hpp"
+#include "redag_analysis/text/footnotes.hpp"
 #include "redag_analysis/text/table.hpp"
 
 namespace redag::cli {
@@ -73,8 +74,14 @@ std::string again_text(const lab::Analysed &analysed, const Margin &margin) {
                : "a factor of " + format_factor(load_factor(analysed.workload, margin.knob, *margin.again));
 }
 
+std::string obstacle_text(const Margin &margin) {
+  return margin.reason.empty() ? margin.obstacle : margin.obstacle + ": " + margin.reason;
+}
+
+// Reasons stand below the table: mostly a few of them limit many rows.
 std::string table_of(const Sensitivity &sensitivity, const std::vector<const KnobResult *> &rows,
                      const StreamTraits &terminal) {
+  Footnotes reasons;
   const bool simulated = sensitivity.simulated_for > 0;
   std::vector<Column> columns = {{"what", false, 9}, {"now", true, 5}, {"limit", true, 7}, {"factor", true, 8}};
   if (simulated) columns.push_back({"simulated", true, 6});
@@ -88,10 +95,13 @@ std::string table_of(const Sensitivity &sensitivity, const std::vector<const Kno
                                {limit_text(margin.knob, margin.position)},
                                {factor_text(margin), tint}};
     if (simulated) cells.push_back({factor_text(row->simulated), Tint::Faint});
-    cells.push_back({margin.obstacle + (margin.again ? " (not monotone)" : ""), Tint::Faint});
+    cells.push_back(
+        {margin.obstacle + reasons.mark(margin.reason) + (margin.again ? " (with gaps)" : ""), Tint::Faint});
     table.add(std::move(cells));
   }
-  return table.render(terminal.width, terminal.colour);
+  const std::string text = table.render(terminal.width, terminal.colour);
+  const bool has_marks = text.find(" [1]") != std::string::npos;  // not where there is no room for them
+  return has_marks ? text + reasons.render(terminal.width) : text;
 }
 
 // Returns all rows in order, or those with the least margin. Rows about all tasks always remain.
@@ -220,7 +230,7 @@ std::string in_words(const Sensitivity &sensitivity) {
   }
   for (const KnobResult &result : sensitivity.results) {
     if (!result.margin.again) continue;
-    text += fmt::format("not monotone: {} is accepted again at {}; every test below the stated limit accepts\n",
+    text += fmt::format("with gaps: {} passes again at {}, above its limit; every value tried below the limit passes\n",
                         knob_name(sensitivity.analysed, result.margin.knob),
                         again_text(sensitivity.analysed, result.margin));
   }
@@ -286,7 +296,7 @@ Json to_json(const Sensitivity &sensitivity) {
                 {"kind", kind_name(margin.knob.kind)},
                 {"now_ns", now ? Json(*now) : Json()}};
     row.update(margin_json(margin));
-    row["obstacle"] = margin.obstacle;
+    row["obstacle"] = obstacle_text(margin);
     row["tasks"] = Json::array();
     for (const std::uint32_t t : margin.knob.tasks) row["tasks"].push_back(task_name(analysed, TaskId(t)));
     row["simulated"] = result.simulated ? margin_json(*result.simulated) : Json();
