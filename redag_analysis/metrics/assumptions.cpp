@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "redag/base/text.hpp"
+#include "redag/base/words.hpp"
 #include "redag_analysis/metrics/jobs.hpp"
 #include "redag_analysis/metrics/summary.hpp"
 
@@ -246,12 +247,8 @@ bool is_too_often(std::uint64_t count, std::uint64_t jobs, Duration excess, Dura
   return static_cast<double>(count) > mean + 5 * std::sqrt(mean) + 4;
 }
 
-std::string plural(std::uint64_t count, const char *noun) {
-  return fmt::format("{} {}{}", format_count(count), noun, count == 1 ? "" : "s");
-}
-
 std::string on_execution(const ExecutionCheck &execution, Duration wcet) {
-  const std::string above = fmt::format("{} of {} exceeded its wcet of {}", format_count(execution.above),
+  const std::string above = fmt::format("{} of {} exceeded the wcet of {}", format_count(execution.above),
                                         plural(execution.jobs, "execution"), humanize_duration(wcet));
   return execution.is_exceeded
              ? fmt::format("wcet exceeded: {} of processor time, {}", humanize_duration(execution.longest), above)
@@ -262,8 +259,8 @@ std::string on_execution(const ExecutionCheck &execution, Duration wcet) {
 std::string why(const ResponseCheck &response, const AssumptionCheck &check, const Workload &workload) {
   const std::string amount = humanize_duration(response.amount);
   const auto charged = [&](Duration part) {
-    return check.is_calibrated ? fmt::format("calibrated: {}", humanize_duration(part))
-                               : std::string("none was charged");
+    return check.is_calibrated ? fmt::format("the calibration allows {}", humanize_duration(part))
+                               : std::string("the analysis allows none");
   };
   switch (response.broken) {
     case Broken::Wcet:
@@ -271,11 +268,11 @@ std::string why(const ResponseCheck &response, const AssumptionCheck &check, con
                          amount);
     case Broken::Release: return fmt::format("late release: by {} ({})", amount, charged(check.allowed.lateness));
     case Broken::Platform:
-      return fmt::format("platform: jobs that held their workers received no processor for {} ({})", amount,
+      return fmt::format("machine: jobs that held their workers got no processor for {} ({})", amount,
                          charged(check.allowed.stall.longest));
     case Broken::Nothing: break;
   }
-  return "no assumption of the bound was seen to fail";
+  return "every assumption of the bound that can be checked held";
 }
 
 std::string on_response(const ResponseCheck &response, const AssumptionCheck &check, const Workload &workload) {

@@ -153,8 +153,7 @@ TEST(Verdict, WhatAMachineMayTakeIsNoAlarmUnlessItWasCalibrated) {
   trace.info.overheads = to_string(Overheads());
   const std::vector<Sentence> alarmed = verdict_of(group_of("late", {trace}));
   EXPECT_EQ(alarmed[2].tone, Tone::Bad);
-  EXPECT_NE(alarmed[2].text.find("platform: jobs that held their workers received no processor for 3ms"),
-            std::string::npos)
+  EXPECT_NE(alarmed[2].text.find("machine: jobs that held their workers got no processor for 3ms"), std::string::npos)
       << alarmed[2].text;
 }
 

@@ -91,7 +91,7 @@ TEST(BoundCheck, NamesWhatIsBroken) {
   EXPECT_EQ(slow.response.task, TaskId(0)) << "the other one's wcet broke";
   EXPECT_FALSE(slow.execution.is_exceeded);
   const std::string text = describe(check, 2, StreamTraits{});
-  EXPECT_THAT(text, HasSubstr("alarm: fast.imu: wcet exceeded: 2ms of processor time, 10 of 10 executions exceeded its "
+  EXPECT_THAT(text, HasSubstr("alarm: fast.imu: wcet exceeded: 2ms of processor time, 10 of 10 executions exceeded the "
                               "wcet of 1ms\n"));
   EXPECT_THAT(text,
               HasSubstr("alarm: slow.plan: 2 responses exceeded the bound of 23ms, the longest is 26ms; wcet exceeded: "
