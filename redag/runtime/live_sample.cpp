@@ -11,7 +11,7 @@ void fill(live::TaskSample &sample, const TaskFigures &figures) {
   sample.finished = jobs.finished;
   sample.skipped = jobs.skipped;
   sample.aborted = jobs.aborted;
-  sample.misses = figures.late + jobs.lost();
+  sample.misses = misses_of(jobs, figures.late);
   sample.deferred = jobs.deferred;
   sample.preemptions = figures.preemptions;
   sample.cpu = figures.usage.total;

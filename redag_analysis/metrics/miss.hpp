@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Defines a deadline miss (docs/model.md, "What is measured") for summaries, watches, tables, pages and experiments.
-// verdict.hpp puts the same into words for whole runs. Pure functions.
+// Defines a deadline miss (docs/model.md, "What is measured") of a recorded job, for summaries, watches, tables, pages
+// and experiments. runtime/stats.hpp does so for counters of a run that goes on. verdict.hpp puts it into words for
+// whole runs. Pure functions.
 #pragma once
 
 #include <cstdint>

@@ -93,6 +93,7 @@ class Investigation {
   [[nodiscard]] std::uint64_t counted() const { return survey_.counted; }
   [[nodiscard]] std::uint64_t missed() const { return survey_.missed; }
   [[nodiscard]] std::uint64_t late_end_to_end() const { return survey_.late_end_to_end; }
+  [[nodiscard]] std::uint64_t misses_in_all() const { return missed() + late_end_to_end(); }
 
   /// The jobs that missed a deadline: the latest first, relative to the deadline; then lost ones. Those released during
   /// the warm-up do not count. One that misses only its DAG's deadline is to be explained end to end.

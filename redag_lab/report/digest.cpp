@@ -55,7 +55,7 @@ Result<void> Group::add(const std::string &path, const trace::Recording &run,
     Result<WhyDigest> why = why_of(*investigation, *schedule);
     if (!why) return tl::unexpected<Diagnostics>(std::move(why.error()));
     worst_run_ = runs_.size();
-    most_missed_ = investigation->missed();
+    most_missed_ = investigation->misses_in_all();
     timeline_ = std::move(timeline);
     schedule_ = *std::move(schedule);
     why_ = *std::move(why);
@@ -75,8 +75,8 @@ Result<void> Group::add(const std::string &path, const trace::Recording &run,
 }
 
 bool Group::is_worst(const metrics::Investigation &investigation) const {
-  if (runs_.empty() || investigation.missed() > most_missed_) return true;
-  return investigation.missed() == most_missed_ && latest_ && latest_->run == runs_.size();
+  if (runs_.empty() || investigation.misses_in_all() > most_missed_) return true;
+  return investigation.misses_in_all() == most_missed_ && latest_ && latest_->run == runs_.size();
 }
 
 void Group::begin(const trace::RunInfo &info) {

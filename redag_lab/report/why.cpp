@@ -93,7 +93,7 @@ Result<WhyDigest> why_of(const metrics::Investigation &investigation, const Sche
   }
   WhyDigest why;
   why.missed = investigation.missed();
-  why.misses = why.missed + investigation.late_end_to_end();
+  why.misses = investigation.misses_in_all();
   why.explained = subjects.size();
   why.worst.resize(std::min(kMostListed, subjects.size()));
   metrics::CulpritCount causes;

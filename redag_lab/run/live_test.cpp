@@ -6,6 +6,8 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <ostream>
+#include <stdexcept>
 #include <thread>
 
 #include "redag/live/reader.hpp"
@@ -16,8 +18,10 @@
 #include "redag/runtime/executor.hpp"
 #include "redag/runtime/live_sample.hpp"
 #include "redag/sched/priority_scheduler.hpp"
+#include "redag_analysis/metrics/summary.hpp"
 #include "redag_lab/run/run_workload.hpp"
 #include "redag_testing/builders.hpp"
+#include "redag_testing/recorded_run.hpp"
 
 namespace redag::lab {
 namespace {
@@ -237,6 +241,72 @@ TEST(LiveExecutor, ShowsJobsThatWaitAndTheirDevices) {
   EXPECT_GT(served.frame.devices[0].busy, 0);
   EXPECT_EQ(served.frame.tasks[2].figures.away, 1U);
   executor.stop();
+}
+
+struct Counts {
+  std::uint64_t released = 0;
+  std::uint64_t finished = 0;
+  std::uint64_t skipped = 0;
+  std::uint64_t aborted = 0;
+  std::uint64_t missed = 0;
+
+  friend bool operator==(const Counts &, const Counts &) = default;
+  friend std::ostream &operator<<(std::ostream &out, const Counts &c) {
+    return out << c.released << " released, " << c.finished << " finished, " << c.skipped << " skipped, " << c.aborted
+               << " aborted, " << c.missed << " missed";
+  }
+};
+
+// One job each is in time, late, and aborted, and one is skipped. The page, the figures of the executor, and the
+// summary of the record count the same.
+TEST(LiveExecutor, CountsAsTheRecordDoes) {
+  const redag::testing::RecordedRun record;
+  runtime::ExecutorOptions options;
+  options.name = "counts-test";
+  options.workers = 1;
+  options.preemption = PreemptionMode::None;
+  options.live = true;
+  options.record = record.folder();
+  options.on_exception = [](const runtime::ExceptionInfo &) { return runtime::OnException::Continue; };
+  runtime::Executor executor(options);
+  runtime::DagBuilder builder("d");
+  const runtime::EventHandle tasks[] = {
+      builder.event("in_time", 1h, [] {}),
+      builder.event("late", 1h, [] { std::this_thread::sleep_for(2ms); }, {.deadline = 1ms}),
+      builder.event("bad", 1h, [] { throw std::runtime_error("no"); }),
+  };
+  const DagId dag = executor.add(std::move(builder));
+  executor.start();
+  for (const runtime::EventHandle &task : tasks) executor.release(task);
+  executor.release(tasks[0]);  // too early: skipped
+  const std::vector<Counts> expected = {{2, 1, 1, 0, 1}, {1, 1, 0, 0, 1}, {1, 0, 0, 1, 1}};
+  std::vector<Counts> live;
+  for (std::uint64_t ended = 0; ended < 4;) {
+    std::this_thread::sleep_for(10ms);
+    const std::optional<live::Page> page = own_page("counts-test");
+    if (!page) continue;
+    live.clear();
+    ended = 0;
+    for (const live::TaskFrame &task : page->frame.tasks) {
+      const live::page::Figures &f = task.figures;
+      live.push_back({f.released, f.finished, f.skipped, f.aborted, f.misses});
+      ended += f.finished + f.skipped + f.aborted;
+    }
+  }
+  EXPECT_EQ(live, expected);
+  std::vector<Counts> figures;
+  for (const runtime::TaskStats &task : executor.stats(dag)) {
+    const sched::Accounting &jobs = task.jobs;
+    figures.push_back({jobs.released, jobs.finished, jobs.skipped, jobs.aborted, task.misses()});
+  }
+  EXPECT_EQ(figures, expected);
+  executor.stop();
+  std::vector<Counts> recorded;
+  for (const metrics::TaskSummary &task : metrics::summarize(record.trace()).tasks) {
+    const metrics::JobStats &jobs = task.jobs;
+    recorded.push_back({jobs.released, jobs.finished, jobs.skipped, jobs.aborted, jobs.missed()});
+  }
+  EXPECT_EQ(recorded, expected);
 }
 
 TEST(LiveExecutor, IsNotSeenUnasked) {

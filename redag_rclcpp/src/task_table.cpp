@@ -170,7 +170,7 @@ std::vector<CallbackStats> TaskTable::stats(const redag::runtime::Engine &engine
     const redag::runtime::TaskFigures figures = engine.figures(row.task);
     stats.jobs = figures.jobs;
     stats.waits = figures.most_waits;
-    stats.misses = callback.late() + stats.jobs.lost();
+    stats.misses = redag::runtime::misses_of(stats.jobs, callback.late());
     stats.response_p50 = callback.response().quantile(0.5);
     stats.response_p99 = callback.response().quantile(0.99);
     stats.response_max = callback.response().longest();
@@ -220,7 +220,7 @@ void TaskTable::sample(const redag::runtime::Engine &engine, const std::map<std:
   for (Row &row : rows) {
     const redag::runtime::TaskFigures figures = engine.figures(TaskId(row.task.key));
     redag::runtime::fill(row.task, figures);
-    row.task.misses = row.callback->late() + figures.jobs.lost();  // as in stats()
+    row.task.misses = redag::runtime::misses_of(figures.jobs, row.callback->late());
   }
   // A task whose messages another task of its DAG takes does not answer for the DAG.
   std::map<std::uint64_t, std::uint32_t> dag_of;

@@ -105,7 +105,7 @@ class Top(Case):
         self.assertIn(served["tasks"][0], ("camera.detect", "lidar.segment", "map.update"))
         text = self.expect(redag("top", process.pid, "--once"), 0).stdout
         self.assertRegex(text, r"device +busy +slots +queue +served/s +serves\ngpu +\[.+%\] +[01]/1 +\d")
-        self.assertRegex(text, r"\d jobs? waits? without a worker")
+        self.assertRegex(text, r"\d jobs? away")
 
     def test_a_run_can_hide(self):
         process = self.start("--no-live")

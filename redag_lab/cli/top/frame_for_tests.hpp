@@ -109,6 +109,7 @@ inline live::Listed robot_page() {
         task.spread.recent[i] = height;
         task.spread.all[i] = height * 100;
       }
+      dag.figures.released += figures.released;
       dag.figures.finished += figures.finished;
       dag.figures.misses += figures.misses;
       dag.figures.cpu += figures.cpu;

@@ -3,8 +3,13 @@
 
 #include "redag_lab/cli/top/live_figures.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
+
+#include "redag/base/text.hpp"
+#include "redag/base/words.hpp"
 
 namespace redag::cli {
 namespace {
@@ -103,7 +108,9 @@ LiveResponse response_of(const Figures &figures, bool since_start) {
 Figures total_of(const Frame &frame) {
   Figures total{};
   for (const DagFrame &dag : frame.dags) {
+    total.released += dag.figures.released;
     total.finished += dag.figures.finished;
+    total.skipped += dag.figures.skipped;
     total.misses += dag.figures.misses;
     total.cpu += dag.figures.cpu;
     total.recent_jobs += dag.figures.recent_jobs;
@@ -112,6 +119,32 @@ Figures total_of(const Frame &frame) {
     total.away += dag.figures.away;
   }
   return total;
+}
+
+std::string misses_in_words(const Figures &total, Duration window) {
+  if (total.misses == 0) return "no deadline missed, of " + plural(total.released, "job");
+  return fmt::format("missed {} of {}, {} in the last {}", format_count(total.misses), plural(total.released, "job"),
+                     format_count(total.recent_misses), humanize_duration(window));
+}
+
+std::string kinds_of_misses(const Figures &total) {
+  std::vector<std::string> kinds;
+  if (total.skipped > 0) kinds.push_back(format_count(total.skipped) + " skipped");
+  if (total.misses > total.skipped) kinds.push_back(format_count(total.misses - total.skipped) + " late or aborted");
+  return join(kinds);
+}
+
+std::string hint_on_misses(const Frame &frame) {
+  constexpr double kBusy = 0.95;
+  const auto worst = std::max_element(frame.dags.begin(), frame.dags.end(), [](const DagFrame &a, const DagFrame &b) {
+    return a.figures.recent_misses < b.figures.recent_misses;
+  });
+  if (worst == frame.dags.end() || worst->figures.recent_misses == 0) return {};
+  std::string text = "most misses lately: " + worst->name;
+  if (worst->max_active > 0 && worst->figures.active >= worst->max_active) text += ", at its max_active";
+  const double busy = frame.workers > 0 ? cpu_of(total_of(frame), frame, false) / frame.workers : 0;
+  if (busy >= kBusy) text += fmt::format(", workers busy {}", format_percent(busy));
+  return text + "; redag why explains a recorded run";
 }
 
 Tint response_tint(Duration response, Duration deadline, Duration bound) {

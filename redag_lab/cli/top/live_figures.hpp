@@ -53,8 +53,15 @@ struct LiveResponse {
 };
 [[nodiscard]] LiveResponse response_of(const live::page::Figures &figures, bool since_start);
 
-/// Returns finished jobs and misses, also the recent ones, and the jobs away, of all DAGs.
+/// Returns the released, finished and skipped jobs and misses, also the recent ones, and the jobs away, of all DAGs.
 [[nodiscard]] live::page::Figures total_of(const live::Frame &frame);
+
+/// Returns "missed 12 of 2 000 jobs, 3 in the last 5s", in the words of docs/model.md.
+[[nodiscard]] std::string misses_in_words(const live::page::Figures &total, Duration window);
+/// Returns "9 skipped and 3 late or aborted"; a live page does not tell late jobs from aborted ones. Empty: no misses.
+[[nodiscard]] std::string kinds_of_misses(const live::page::Figures &total);
+/// Returns what the figures tell about recent misses, and what tells more. Empty: there are none.
+[[nodiscard]] std::string hint_on_misses(const live::Frame &frame);
 
 /// Rates a response time: Bad above the deadline or the bound, Caution near the lesser of them. A limit of 0 means
 /// none.

@@ -81,6 +81,30 @@ TEST(LiveFigures, SayThatNobodyWrites) {
   EXPECT_EQ(overdue(strange, 25 * kSecond), std::nullopt);
 }
 
+// "8 939 deadlines missed, 2 869 jobs": misses are a part of the released jobs, not of the finished ones.
+TEST(LiveFigures, MissesAreOfReleasedJobs) {
+  live::Listed listed = small_page();
+  live::Frame &frame = listed.page->frame;
+  EXPECT_EQ(misses_in_words(total_of(frame), frame.window), "no deadline missed, of 0 jobs");
+  EXPECT_EQ(hint_on_misses(frame), "");
+  live::page::Figures &fast = frame.dags[0].figures;
+  fast.released = 11'808;
+  fast.finished = 2'869;
+  fast.skipped = 8'900;
+  fast.misses = 8'939;
+  fast.recent_misses = 12;
+  fast.active = 0;
+  const live::page::Figures total = total_of(frame);
+  EXPECT_EQ(misses_in_words(total, frame.window), "missed 8 939 of 11 808 jobs, 12 in the last 2s");
+  EXPECT_EQ(kinds_of_misses(total), "8 900 skipped and 39 late or aborted");
+  EXPECT_EQ(hint_on_misses(frame), "most misses lately: fast; redag why explains a recorded run");
+  fast.active = 1;
+  fast.recent_cpu = 3'700 * kMillisecond;  // of 2 s on two workers, with the 300 ms of the other DAG
+  EXPECT_EQ(hint_on_misses(frame),
+            "most misses lately: fast, at its max_active, workers busy 100.0 %; redag why explains a recorded run");
+  EXPECT_EQ(to_json(listed, *listed.page, 21 * kSecond)["on_misses"], hint_on_misses(frame));
+}
+
 TEST(LiveJson, HasWhatIsShown) {
   live::Listed listed = small_page();
   live::Frame &frame = listed.page->frame;
@@ -95,6 +119,7 @@ TEST(LiveJson, HasWhatIsShown) {
   EXPECT_EQ(document["format"], "redag.live/1");
   EXPECT_EQ(document["age_ns"], kSecond);
   EXPECT_EQ(document["alert"], nullptr);
+  EXPECT_EQ(document["on_misses"], nullptr);
   EXPECT_EQ(document["tasks"][0]["bound_ns"], 2 * kMillisecond);
   EXPECT_EQ(document["tasks"][1]["bound_ns"], nullptr);
   EXPECT_EQ(document["tasks"][1]["rate"], 20.0);

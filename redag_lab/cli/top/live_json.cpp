@@ -78,6 +78,7 @@ Json task_json(const live::TaskFrame &task, const live::Frame &frame) {
 
 Json to_json(const live::Listed &listed, const live::Page &page, Time now) {
   const live::Frame &frame = page.frame;
+  const std::string hint = hint_on_misses(frame);
   Json document = {{"format", "redag.live/1"},
                    {"pid", listed.pid},
                    {"number", listed.number},
@@ -99,6 +100,7 @@ Json to_json(const live::Listed &listed, const live::Page &page, Time now) {
                    {"threads_in_all", frame.threads_in_all},
                    {"devices", Json::array()},
                    {"devices_in_all", frame.devices_in_all},
+                   {"on_misses", hint.empty() ? Json(nullptr) : Json(hint)},
                    {"alert", frame.alert.empty() ? Json(nullptr) : Json(frame.alert)},
                    {"dags", Json::array()},
                    {"tasks", Json::array()}};

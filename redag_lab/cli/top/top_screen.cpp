@@ -9,6 +9,7 @@
 #include <array>
 
 #include "redag/base/text.hpp"
+#include "redag/base/words.hpp"
 #include "redag_analysis/text/table.hpp"
 #include "redag_lab/cli/top/device_lines.hpp"
 #include "redag_lab/cli/top/live_figures.hpp"
@@ -38,7 +39,7 @@ constexpr std::array kHelp{
     "COLUMNS",
     "  p50, p99, max    response time: from the nominal release to the end",
     "                   of a DAG: end to end, of the sink with the worst one",
-    "  missed           deadline misses since the start, +lately",
+    "  missed           jobs late, skipped or aborted since the start, +lately",
     "  bound            proven bound on the response time",
     "  active           jobs that have started and not ended, and max_active",
     "  away             of these, jobs that wait without a worker: for a device,",
@@ -76,18 +77,17 @@ std::vector<Line> head_of(const live::Listed &listed, const Frame &frame, Time n
   const double busy = frame.workers > 0 ? cpu_of(total, frame, false) / frame.workers : 0;
   const Duration lived = frame.published - frame.began;
   const double cost = lived > 0 ? static_cast<double>(frame.publisher_cpu) / static_cast<double>(lived) : 0;
-  lines.push_back(words(fmt::format("up {}  jobs {} ({:.4g}/s)  workers busy {}  page costs {}",
+  lines.push_back(words(fmt::format("up {}  finished {} ({:.4g}/s)  workers busy {}  page costs {}",
                                     humanize_duration(lived), format_count(total.finished),
                                     rate_of(total, frame, false), format_percent(busy), format_percent(cost))));
-  lines.push_back(words(fmt::format("misses {}, {} in the last {}", format_count(total.misses),
-                                    format_count(total.recent_misses), humanize_duration(frame.window)),
-                        total.recent_misses > 0 ? Tint::Bad
-                        : total.misses > 0      ? Tint::Caution
-                                                : Tint::Good));
+  lines.push_back(words(misses_in_words(total, frame.window), total.recent_misses > 0 ? Tint::Bad
+                                                              : total.misses > 0      ? Tint::Caution
+                                                                                      : Tint::Good));
   if (total.away > 0 || !frame.devices.empty()) {
-    lines.back().push_back(
-        {fmt::format("  {} job{} without a worker", total.away, total.away == 1 ? " waits" : "s wait")});
+    lines.back().push_back({fmt::format("  {} away", plural(total.away, "job"))});
   }
+  if (const std::string kinds = kinds_of_misses(total); !kinds.empty()) lines.back().push_back({"  " + kinds});
+  if (const std::string hint = hint_on_misses(frame); !hint.empty()) lines.back().push_back({"  " + hint});
   if (!frame.alert.empty()) lines.push_back(words(frame.alert, Tint::Bad));
   if (const auto late = overdue(frame, now)) {
     lines.push_back(

@@ -62,10 +62,12 @@ function show() {
   setClass(badge, problem ? 'state trouble' : 'state running');
   setText(facts, [`${frame.program} ${idOf(frame)}`, frame.driver, `${frame.workers} worker${frame.workers === 1 ? '' : 's'}`, `preemption ${frame.preemption}`,
     frame.policy, `up ${inWords(frame.up_ns)}`, `live page ${formatPercent(frame.page_cpu_ns / frame.up_ns)} of a processor`].join(' \u00b7 '));
-  const total = frame.dags.reduce((sum, dag) => ({jobs: sum.jobs + dag.finished, rate: sum.rate + dag.rate, missed: sum.missed + dag.misses, lately: sum.lately + dag.recent.misses}),
-    {jobs: 0, rate: 0, missed: 0, lately: 0});
-  const verdict = total.missed === 0 ? 'No deadline missed' : `${formatCount(total.missed)} deadlines missed, ${formatCount(total.lately)} in the last ${inWords(frame.window_ns)}`;
-  setText(misses, `${verdict} \u2013 ${formatCount(total.jobs)} jobs, ${Number(total.rate.toPrecision(4))}/s`);
+  const total = frame.dags.reduce((sum, dag) => ({jobs: sum.jobs + dag.released, finished: sum.finished + dag.finished, rate: sum.rate + dag.rate, missed: sum.missed + dag.misses, lately: sum.lately + dag.recent.misses}),
+    {jobs: 0, finished: 0, rate: 0, missed: 0, lately: 0});
+  const jobs = `${formatCount(total.jobs)} job${total.jobs === 1 ? '' : 's'}`;
+  const verdict = total.missed === 0 ? `No deadline missed, of ${jobs}`
+    : `${formatCount(total.missed)} of ${jobs} missed their deadline, ${formatCount(total.lately)} in the last ${inWords(frame.window_ns)}`;
+  setText(misses, `${verdict} \u2013 ${formatCount(total.finished)} finished, ${Number(total.rate.toPrecision(4))}/s${frame.on_misses ? ` \u2013 ${frame.on_misses}` : ''}`);
   setClass(misses, total.lately > 0 ? 'bad-text' : total.missed > 0 ? 'near-text' : 'good-text');
   setText(alarm, [frame.alert, problem.startsWith('no update') ? 'The process is stopped, or gets no processor.' : null,
     frame.left_out > 0 ? `${formatCount(frame.left_out)} more tasks do not fit the live page.` : null].filter(Boolean).join(' '));
