@@ -105,19 +105,19 @@ await test('shares end at 100 %, and no number stands on the range of its repeti
     const texts = [...box.querySelectorAll('svg text')].filter((text) => /\d\s?(%|\u00b5?[mn]?s)$/.test(text.textContent));
     const isTick = (text) => text.getAttribute('text-anchor') === 'end';
     const numbers = texts.filter((text) => !isTick(text)).map(boxOf);
-    const lines = [...box.querySelectorAll('svg path')].filter((shape) => shape.getAttribute('fill') === 'none').map(boxOf).filter(({width, height}) => width < 3 && height > 1 && height < 200);
+    const lines = [...box.querySelectorAll('svg path')].filter((shape) => shape.getAttribute('stroke-width') === '1.2').map(boxOf);
     const meet = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom - 1 && b.top < a.bottom - 1;
     const filled = [...box.querySelectorAll('svg path')].filter((shape) => !['none', 'transparent'].includes(shape.getAttribute('fill'))).map(boxOf);
     return {ticks: texts.filter(isTick).map((text) => text.textContent), numbers: numbers.length,
-      bars: filled.filter(({width, height}) => height > 20 && width > 8 && width < 80).length, overprinted: numbers.filter((number) => lines.some((line) => meet(number, line))).length};
+      ranges: lines.length, bars: filled.filter(({width, height}) => height > 20 && width > 8 && width < 80).length, overprinted: numbers.filter((number) => lines.some((line) => meet(number, line))).length};
   });
   const missed = await look('missed');
   assert.ok(missed.ticks.length > 2 && missed.ticks.every((tick) => parseFloat(tick) <= 100), missed.ticks.join(', '));
   assert.ok(missed.bars >= 2);
   const p99 = await look('p99');
   assert.equal(p99.bars, 0, 'dots: a logarithmic axis has no zero for bars');
-  for (const {numbers, overprinted} of [missed, p99]) {
-    assert.ok(numbers >= 9, `${numbers} numbers`);
+  for (const {numbers, ranges, overprinted} of [missed, p99]) {
+    assert.ok(numbers >= 9 && ranges > 0, `${numbers} numbers, ${ranges} lines of ranges`);
     assert.equal(overprinted, 0);
   }
   none(problems);
