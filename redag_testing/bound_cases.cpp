@@ -185,7 +185,7 @@ class CaseGenerator {
     if (limits_.caps && chance(rng_, 0.5)) {
       dag.max_active = between(rng_, 1, static_cast<std::uint32_t>(dag.tasks.size()));
     }
-    if (limits_.edges && limits_.phases && chance(rng_, 0.3)) free_sources(dag);
+    if (limits_.edges && limits_.phases && chance(rng_, limits_.rates ? 0.3 : 0.1)) free_sources(dag);
     if (limits_.edges && chance(rng_, 0.3)) dag.deadline = dag.tasks.front().period;
   }
 

@@ -221,7 +221,7 @@ std::uint64_t compare_all(const BoundCaseLimits &limits, int count, Compare comp
 
 TEST(GlobalDag, BoundedIsNeverAboveMelani) {
   std::uint64_t smaller = 0;
-  const auto compared = compare_all(graphs(sched::Preemption::Full), 2000,
+  const auto compared = compare_all(graphs(sched::Preemption::Full), 2200,
                                     [&](const testing::BoundCase &bound_case, const TaskSet &task_set) {
                                       const Outcome melanis = melani().apply(task_set);
                                       const Outcome bounded = dag_bounded().apply(task_set);
@@ -289,7 +289,7 @@ TEST(GlobalDag, MoreExecutionNeverShrinksABound) {
 TEST(GlobalDag, AnyOrderIsNeverBelowBounded) {
   std::uint64_t larger = 0;
   const auto compared =
-      compare_all(with_max_active(graphs(sched::Preemption::Full)), 1500,
+      compare_all(with_max_active(graphs(sched::Preemption::Full)), 1900,
                   [&](const testing::BoundCase &bound_case, const TaskSet &task_set) {
                     const Outcome any = dag_any().apply(task_set);
                     const Outcome bounded = dag_bounded().apply(task_set);

@@ -292,7 +292,7 @@ TEST(SuspensionAware, MoreWorkNeverShrinksABound) {
       ++compared;
     }
   };
-  testing::for_cases(with_waits(graphs(sched::Preemption::Full)), 300, check);
+  testing::for_cases(with_waits(graphs(sched::Preemption::Full)), 400, check);
   EXPECT_GT(compared, 100U);
 }
 
