@@ -19,6 +19,7 @@ set(alone
   redag_analysis/metrics/perfetto_test.cpp
   redag_analysis/metrics/summary_test.cpp
   redag_analysis/metrics/trace_checker_test.cpp
+  redag_analysis/metrics/why_test.cpp
   redag_analysis/one_worker/edf_demand_test.cpp
   redag_analysis/one_worker/exact_points_test.cpp
   redag_analysis/one_worker/paper_test.cpp
