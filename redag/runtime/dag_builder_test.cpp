@@ -33,12 +33,12 @@ dags:
       - {name: imu, wcet: 300us, bcet: 100us, wcet_low: 200us, offset: 1ms, jitter: 50us, priority: 9, criticality: high}
       - {name: ekf, wcet: 900us, activation: data, after: [imu], budget: 1ms, on_budget: demote, group: filter}
       - {name: pid, wcet: 400us, activation: data, after: ekf, deadline: 4ms, region: 50us, execution: constant}
-      - {name: log, wcet: 1ms, period: 50ms, after: [pid], overrun: {queue: 3}, on_budget: log, budget: 2ms}
+      - {name: log, wcet: 1ms, rate: 20Hz, after: [pid], overrun: {queue: 3}, on_budget: log, budget: 2ms}
   - name: vision
     degrade: {skip: 2}
     tasks:
       - {name: camera, wcet: 8ms, bcet: 2ms, period: 33ms, concurrency: 2, execution: {normal: {mean: 4ms, stddev: 1ms}}}
-      - {name: map, wcet: 9ms, period: 200ms, execution: {empirical: [1ms, 9ms]}, overrun: queue, budget: 10ms,
+      - {name: map, wcet: 9ms, period: 200ms, activation: event, execution: {empirical: [1ms, 9ms]}, overrun: queue, budget: 10ms,
          on_budget: skip_next}
   - name: mapping
     criticality: low

@@ -126,7 +126,7 @@ TEST_P(CoarserClock, NoBoundIsBroken) {
           return with_tick(std::move(drawn), tick);
         };
         const testing::BoundPropertyResult result =
-            testing::check_bound(method, generator, {.workloads = 10, .runs = 3, .periods = 5});
+            testing::check_bound(method, generator, {.workloads = 25, .runs = 3, .periods = 5});
         EXPECT_EQ(result.violations, 0U) << result.first_violation;
         bounds += result.bounds;
       }

@@ -198,7 +198,8 @@ TEST(SuspensionAware, IsForTasksThatWait) {
 TEST(SuspensionAware, RefusesWhatItDoesNotKnow) {
   Workload workload = three(2, {"gpu", 1});
   workload.dags[0].tasks[0].group = workload.dags[1].tasks[0].group = "g";
-  EXPECT_EQ(compiled(workload).not_analysable, "a job that waits holds its group, for which no bound is known");
+  EXPECT_EQ(compiled(workload).not_analysable,
+            "callbacks that wait (segments) have bounds only without groups, which a job holds while it waits");
   EXPECT_FALSE(compiled(workload).has_waits);
   workload = three(2, {"gpu", 1});
   workload.dags[0].criticality = Criticality::High;

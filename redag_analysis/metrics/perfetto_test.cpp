@@ -150,7 +150,7 @@ TEST_F(Perfetto, OverlappingAndPreemptedJobs) {
   t.at(3).arrives("a", 1).finished("a", 0, 0).dispatched("a", 1, 0, 13).at(4).finished("a", 1, 0).resumed("b", 0, 0);
   t.at(6).finished("b", 0, 0);
   const Picture picture = picture_of(t.until(10));
-  EXPECT_THAT(texts(picture.slices_of("workers (redag, full)/worker 0")),
+  EXPECT_THAT(texts(picture.slices_of("workers (redag, os)/worker 0")),
               ElementsAre("b 0-2 job=0", "a 2-3 job=0", "a 3-4 job=1", "b 4-6 job=0"));
   const std::vector<PictureEvent> jobs = picture.slices_of("DAG d/a");
   EXPECT_THAT(texts(jobs), ElementsAre("a 2-3 job=0 outcome=finished slack_ns=9000000",

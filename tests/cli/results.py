@@ -337,7 +337,7 @@ class Report(Case):
     def test_one_run(self):
         out = self.results("out")
         result = self.expect(redag("report", out), 0)
-        self.assertRegex(result.stdout, r"missed their deadline .*\n.*report\.html: [\d.]+ MB")
+        self.assertRegex(result.stdout, r"missed their deadline .*\n.*report\.html: [\d.]+ [KM]B")
         page = (out / "report.html").read_text()
         self.assertTrue(page.startswith("<!doctype html>") and page.rstrip().endswith("</html>"))
         self.expect(redag("report", out, "-o", self.folder / "again.html"), 0)

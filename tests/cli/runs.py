@@ -218,7 +218,8 @@ class Waits(Case):
         # A device that serves in the order of requests lets each less urgent task go first.
         fifo = self.write("fifo.yaml", one.read_text().replace("queue: priority", "queue: fifo"))
         self.expect(redag("analyze", fifo, "--check", *oblivious), 1)
-        self.assertIn("queue: priority", self.expect(redag("analyze", fifo, "--explain", "camera.detect"), 0).stdout)
+        late = self.write("late.yaml", fifo.read_text().replace("deadline: 50ms", "deadline: 30ms"))
+        self.assertIn("queue: priority", self.expect(redag("analyze", late, "--explain", "camera.detect"), 0).stdout)
 
     def test_bounded_on_several_workers(self):
         self.expect(redag("analyze", self.FILE, "--check"), 0)
