@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <map>
 
+#include "redag_analysis/core/rate_edges.hpp"
 #include "redag_analysis/many_workers/dag_isolated.hpp"
 #include "redag_analysis/many_workers/global_dag.hpp"
 #include "redag_testing/bound_property.hpp"
