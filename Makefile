@@ -18,7 +18,7 @@ demo: ## build the program, compare the executors on one workload, and make resu
 	@tools/bootstrap run
 	cmake --preset release
 	cmake --build --preset release
-	build/release/bin/redag compare workloads/contention.yaml --executors redag,mte,ste --repeat 3 --duration 5s \
+	build/release/bin/redag compare workloads/contention.yaml --executors redag,mte,ste --repeat 3 --duration 3s \
 	  --out results/demo --force
 	build/release/bin/redag report results/demo
 
