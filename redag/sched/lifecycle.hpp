@@ -128,7 +128,7 @@ class Lifecycle final : public Scheduler {
   [[nodiscard, gnu::always_inline]] inline std::uint32_t add_job(TaskId id, TaskState &task, std::uint32_t number,
                                                                  Time nominal, Time turn);
   [[gnu::always_inline]] inline void prepare(Job &job, const TaskState &task, Time origin);
-  [[gnu::always_inline]] inline bool hand_over(std::uint32_t slot, Time now, std::uint32_t most) requires HandsOver<D>;
+  [[gnu::always_inline]] inline bool hand_over(std::uint32_t slot, Time now, std::uint32_t most);
   void tell_hand_over(const Job &ended, const Job &next, Time now);
   void skip(std::uint32_t slot, Reason reason);
   template <class Predicate>

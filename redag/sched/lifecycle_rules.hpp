@@ -146,33 +146,37 @@ Step Lifecycle<D>::finish(JobSlot job, Time now, Outcome outcome, std::uint32_t 
 
 // Direct hand-over: the job releases one data task and nothing else depends on its end, so that the new job takes its
 // place without a queue and without a search for a worker. The result is that of complete() and dispatch(). Returns
-// false, with nothing done, in all other cases.
+// false, with nothing done, in all other cases. Not constrained: clang 14 instantiates it for other dispatchers as
+// well.
 template <Dispatcher D>
-bool Lifecycle<D>::hand_over(std::uint32_t slot, Time now, std::uint32_t most) requires HandsOver<D> {
-  REDAG_CHECK(slot < table_.jobs.size() && table_.jobs[slot].started(), "completion of a job that does not run");
-  const Job &job = table_.jobs[slot];
-  const TaskId heir = table_.precedence.heir(job.task);
-  if (!heir.valid() || most == 0) return false;
-  TaskState &task = table_.tasks[job.task.value];
-  TaskState &next = table_.tasks[heir.value];
-  if (next.ready_count > 0 || !table_.step.is_new()) return false;
-  if (!dispatcher_.can_replace(job, heir)) return false;
+bool Lifecycle<D>::hand_over(std::uint32_t slot, Time now, std::uint32_t most) {
+  if constexpr (HandsOver<D>) {
+    REDAG_CHECK(slot < table_.jobs.size() && table_.jobs[slot].started(), "completion of a job that does not run");
+    const Job &job = table_.jobs[slot];
+    const TaskId heir = table_.precedence.heir(job.task);
+    if (!heir.valid() || most == 0) return false;
+    TaskState &task = table_.tasks[job.task.value];
+    TaskState &next = table_.tasks[heir.value];
+    if (next.ready_count > 0 || !table_.step.is_new()) return false;
+    if (!dispatcher_.can_replace(job, heir)) return false;
 
-  table_.step.begin(now);
-  ++task.finished;
-  const Precedence::Data data = table_.precedence.hand_on(job.task, job.release, job.origin, now);
-  REDAG_CHECK(next.free_slot != kNil, "a task without a waiting or ready job has no free slot");
-  const std::uint32_t its_slot =
-      add_job(heir, next, count_release(next), data.complete, takes_turns_ ? data.origin : 0);
-  Job &its_job = table_.jobs[its_slot];
-  prepare(its_job, next, data.origin);
-  if (table_.step.records(JobEventKind::Finished) || table_.step.records(JobEventKind::Released) ||
-      table_.step.records(JobEventKind::Ready)) {
-    tell_hand_over(job, its_job, now);
+    table_.step.begin(now);
+    ++task.finished;
+    const Precedence::Data data = table_.precedence.hand_on(job.task, job.release, job.origin, now);
+    REDAG_CHECK(next.free_slot != kNil, "a task without a waiting or ready job has no free slot");
+    const std::uint32_t its_slot =
+        add_job(heir, next, count_release(next), data.complete, takes_turns_ ? data.origin : 0);
+    Job &its_job = table_.jobs[its_slot];
+    prepare(its_job, next, data.origin);
+    if (table_.step.records(JobEventKind::Finished) || table_.step.records(JobEventKind::Released) ||
+        table_.step.records(JobEventKind::Ready)) {
+      tell_hand_over(job, its_job, now);
+    }
+    dispatcher_.replace(slot, its_slot, most);
+    table_.free_slot(slot, task);
+    return true;
   }
-  dispatcher_.replace(slot, its_slot, most);
-  table_.free_slot(slot, task);
-  return true;
+  return false;
 }
 
 // One call for all three events: without a trace, hand_over() is shorter by more than the checks.
