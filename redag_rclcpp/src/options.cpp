@@ -4,6 +4,7 @@
 #include "redag_rclcpp/options.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>

@@ -10,6 +10,7 @@
 
 #include "redag/model/validate.hpp"
 #include "redag/runtime/live_sample.hpp"
+#include "redag/runtime/stats.hpp"
 
 namespace redag_rclcpp {
 
