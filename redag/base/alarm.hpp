@@ -6,9 +6,11 @@
 #pragma once
 
 #include <sys/timerfd.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <atomic>
+#include <cerrno>
 #include <cstdint>
 #include <ctime>
 
@@ -42,10 +44,14 @@ class Alarm {
     rung_.store(true, std::memory_order_seq_cst);
     arm(0);
   }
-  /// Owner only: sleeps until the time or a ring. Can return without either.
+  /// Owner only: sleeps until the time or a ring. Can return without either. If the program has closed the descriptor,
+  /// as some do that become a daemon, it sleeps for a millisecond: late, but without taking the processor.
   void wait() noexcept {
     std::uint64_t expirations = 0;
-    static_cast<void>(!::read(timer_, &expirations, sizeof expirations));
+    if (::read(timer_, &expirations, sizeof expirations) < 0 && errno != EINTR) {
+      const timespec nap{0, kMillisecond};
+      static_cast<void>(::nanosleep(&nap, nullptr));
+    }
     rung_.exchange(false, std::memory_order_seq_cst);
   }
 

@@ -4,6 +4,7 @@
 #include "redag/base/alarm.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <ctime>
 #include <thread>
@@ -30,6 +31,19 @@ TEST_F(AlarmTest, GoesOffAtItsTimeAndNotBefore) {
   alarm_.set(at);
   alarm_.wait();
   EXPECT_GE(now(), at);
+}
+
+// Helpers that make a daemon close all descriptors. Each wait then takes a millisecond.
+TEST_F(AlarmTest, WithoutItsDescriptorItDoesNotSpin) {
+  const int next = ::dup(0);
+  ASSERT_GE(next, 0);
+  ::close(next);
+  Alarm alarm;
+  ASSERT_TRUE(alarm.open());  // has the descriptor that was free
+  ::close(next);
+  int waits = 0;
+  for (const Time end = now() + 20 * kMillisecond; now() < end; ++waits) alarm.wait();
+  EXPECT_LE(waits, 20);
 }
 
 TEST_F(AlarmTest, ATimeThatHasPassedGoesOffAtOnce) {

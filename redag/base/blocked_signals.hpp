@@ -23,6 +23,9 @@ class BlockedSignals {
   BlockedSignals(const BlockedSignals &) = delete;
   BlockedSignals &operator=(const BlockedSignals &) = delete;
 
+  /// The signals that were blocked before.
+  [[nodiscard]] const sigset_t &before() const { return before_; }
+
  private:
   sigset_t before_{};
 };

@@ -73,7 +73,7 @@ class HistogramCounts {
     return index == kBuckets - 1 ? kNever : static_cast<Duration>(Buckets::highest_in(index));
   }
 
-  std::array<std::uint32_t, kBuckets> buckets_{};
+  std::array<std::uint64_t, kBuckets> buckets_{};
   Duration longest_ = 0;
 };
 
@@ -102,7 +102,7 @@ class Histogram {
   [[nodiscard]] Duration quantile(double share) const noexcept { return counts().quantile(share); }
 
  private:
-  std::array<std::atomic<std::uint32_t>, HistogramCounts::kBuckets> buckets_{};
+  std::array<std::atomic<std::uint64_t>, HistogramCounts::kBuckets> buckets_{};
   std::atomic<Duration> longest_{0};
 };
 

@@ -69,6 +69,16 @@ TEST(Histogram, WhatIsLongerThanAllBucketsIsNotMadeShorter) {
   EXPECT_EQ(histogram.quantile(1.0), kNever - 1);
 }
 
+// 1 kHz for seven weeks.
+TEST(Histogram, CountsGoBeyondThirtyTwoBits) {
+  Histogram histogram;
+  histogram.add(10 * kMicrosecond);
+  HistogramCounts counts = histogram.counts();
+  for (int doubled = 0; doubled < 33; ++doubled) counts += counts;
+  EXPECT_EQ(counts.total(), std::uint64_t{1} << 33U);
+  EXPECT_LE(counts.quantile(0.5), 10 * kMicrosecond);
+}
+
 TEST(Histogram, ManyThreadsLoseNothing) {
   Histogram histogram;
   constexpr int kEach = 20'000;

@@ -142,7 +142,7 @@ std::string provenance_to_json(const Provenance &provenance) {
 }
 
 Result<Provenance> provenance_from_json(std::string_view text) {
-  if (json_nests_deeper(text)) return make_error("the provenance is nested too deeply");
+  if (json_is_too_large(text)) return make_error("the provenance is nested too deeply, or has too many values");
   const Json json = Json::parse(text, nullptr, false);
   if (!json.is_object()) return make_error("the provenance must be an object");
   Provenance provenance;

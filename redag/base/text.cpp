@@ -124,8 +124,9 @@ std::string format_count_and_share(std::uint64_t part, std::uint64_t whole) {
                      format_percent(static_cast<double>(part) / static_cast<double>(whole)));
 }
 
-bool json_nests_deeper(std::string_view json, std::size_t levels) {
+bool json_is_too_large(std::string_view json, std::size_t levels, std::size_t values) {
   std::size_t depth = 0;
+  std::size_t begun = 0;  // values: the first one of each array and object, and one behind each comma
   bool in_text = false;
   for (std::size_t i = 0; i < json.size(); ++i) {
     const char c = json[i];
@@ -135,7 +136,9 @@ bool json_nests_deeper(std::string_view json, std::size_t levels) {
     } else if (c == '"') {
       in_text = true;
     } else if (c == '[' || c == '{') {
-      if (++depth > levels) return true;
+      if (++depth > levels || ++begun > values) return true;
+    } else if (c == ',') {
+      if (++begun > values) return true;
     } else if ((c == ']' || c == '}') && depth > 0) {
       --depth;
     }

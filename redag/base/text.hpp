@@ -49,8 +49,13 @@ inline constexpr const char *kMaxDurationText = "1281023h (146 years)";  // kMax
 /// The deepest nesting in JSON that is read. JSON that this project writes is less deep.
 inline constexpr std::size_t kMaxJsonDepth = 32;
 
-/// Returns true if more than `levels` arrays and objects are nested. Code that copies or prints a JSON tree recurses
-/// once a level: call this before parsing JSON from others. For text that is not JSON the answer is undefined.
-[[nodiscard]] bool json_nests_deeper(std::string_view json, std::size_t levels = kMaxJsonDepth);
+/// The most values and keys in JSON that is read. A tree takes up to a hundred bytes for each.
+inline constexpr std::size_t kMaxJsonValues = std::size_t{1} << 20U;
+
+/// Returns true if more than `levels` arrays and objects are nested, or if there are more than `values` values. Code
+/// that copies or prints a JSON tree recurses once a level: call this before parsing JSON from others. For text that is
+/// not JSON the answer is undefined.
+[[nodiscard]] bool json_is_too_large(std::string_view json, std::size_t levels = kMaxJsonDepth,
+                                     std::size_t values = kMaxJsonValues);
 
 }  // namespace redag

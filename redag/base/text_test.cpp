@@ -27,13 +27,15 @@ TEST(Text, AMissNeverReadsAsNone) {
 }
 
 TEST(Text, TheDepthOfJson) {
-  EXPECT_FALSE(json_nests_deeper("", 0));
-  EXPECT_FALSE(json_nests_deeper("[1, 2], [3]", 1));
-  EXPECT_TRUE(json_nests_deeper(R"({"a": [1]})", 1));
-  EXPECT_FALSE(json_nests_deeper(R"({"a": [1]})", 2));
-  EXPECT_FALSE(json_nests_deeper(R"(["[[[\"[[", "\\"])", 1)) << "brackets in texts are text";
-  EXPECT_TRUE(json_nests_deeper(std::string(1'000'000, '[')));
-  EXPECT_FALSE(json_nests_deeper("]]]]"));
+  EXPECT_FALSE(json_is_too_large("", 0));
+  EXPECT_FALSE(json_is_too_large("[1, 2], [3]", 1));
+  EXPECT_TRUE(json_is_too_large(R"({"a": [1]})", 1));
+  EXPECT_FALSE(json_is_too_large(R"({"a": [1]})", 2));
+  EXPECT_FALSE(json_is_too_large(R"(["[[[\"[[", "\\"])", 1)) << "brackets in texts are text";
+  EXPECT_TRUE(json_is_too_large(std::string(1'000'000, '[')));
+  EXPECT_FALSE(json_is_too_large("]]]]"));
+  EXPECT_FALSE(json_is_too_large(R"({"a": [1, "2,3,4"]})", 2, 3));
+  EXPECT_TRUE(json_is_too_large(R"({"a": [1, "2,3,4", 5]})", 2, 3));
 }
 
 TEST(Text, WhatATerminalWouldObeyIsWrittenOut) {

@@ -28,6 +28,14 @@ inline constexpr Time kNever = std::numeric_limits<Time>::max();
 /// The longest duration accepted from outside (about 146 years): the sum of two never overflows.
 inline constexpr Duration kMaxDuration = std::numeric_limits<Duration>::max() / 2;
 
+/// The sum, or the first or last time that there is if it lies outside: "in 300 years" stays later than all that is
+/// due.
+[[nodiscard]] constexpr Time saturated_add(Time time, Duration duration) noexcept {
+  Time sum = 0;
+  if (!__builtin_add_overflow(time, duration, &sum)) return sum;
+  return duration > 0 ? kNever : std::numeric_limits<Time>::min();
+}
+
 /// Reads "250ns", "3us", "1.5ms", "2s", "1min", "1h" (also "µs"); "0" needs no unit. Exact: it is an error if the value
 /// has no unit, does not fit, or is not a whole number of nanoseconds. Reads a leading "-", for the caller to reject.
 [[nodiscard]] Result<Duration> parse_duration(std::string_view text);

@@ -9,6 +9,13 @@
 namespace redag {
 namespace {
 
+TEST(SaturatedAdd, StaysWithinWhatThereIs) {
+  EXPECT_EQ(saturated_add(5, 7), 12);
+  EXPECT_EQ(saturated_add(5, kNever), kNever);
+  EXPECT_EQ(saturated_add(-5, kNever), kNever - 5);
+  EXPECT_EQ(saturated_add(std::numeric_limits<Time>::min(), -1), std::numeric_limits<Time>::min());
+}
+
 TEST(ParseDuration, ReadsEveryUnit) {
   EXPECT_EQ(parse_duration("250ns"), 250);
   EXPECT_EQ(parse_duration("3us"), 3 * kMicrosecond);

@@ -13,6 +13,7 @@
 #include <cerrno>
 #include <charconv>
 #include <cstddef>
+#include <random>
 #include <system_error>
 #include <tuple>
 
@@ -27,7 +28,6 @@ constexpr std::string_view kEnd = "end\n";
 constexpr std::string_view kOrderPrefix = "redag-order.";
 constexpr std::string_view kUnfinished = ".new";  // behind the name of a page that is being written
 constexpr std::size_t kLongestText = std::size_t{64} * 1024;
-constexpr unsigned kMostExecutors = 1000;  // of one process
 constexpr int kMostPriority = 99;
 
 /// Takes "`prefix`NUMBER`end`" from the beginning of `text`.
@@ -101,6 +101,26 @@ std::optional<OrderStatement> read_statement(const std::string &path) {
   return parse_order(std::string_view(text).substr(0, size));
 }
 
+struct NewFile {
+  int descriptor = -1;  // negative: see errno
+  OrderPageName name;
+  std::string path;
+};
+
+// Others can create files in the same folder. With a number that nobody can know before, they cannot be in the way.
+NewFile create_file(const std::string &folder, std::string_view suffix) {
+  constexpr int kAttempts = 100;
+  std::random_device random;
+  NewFile file;
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    file.name = {this_process(), random()};
+    file.path = path_of(folder, file.name) + std::string(suffix);
+    file.descriptor = create_owned_file(file.path);
+    if (file.descriptor >= 0 || errno != EEXIST) break;
+  }
+  return file;
+}
+
 tl::unexpected<Diagnostics> not_possible(const std::string &path, int error) {
   return make_error(fmt::format("{}: {}", path, std::generic_category().message(error)),
                     "executors that share an order need a folder where this user may create files");
@@ -149,30 +169,23 @@ std::vector<OrderPage> read_order_pages(const std::string &folder) {
 }
 
 Result<std::unique_ptr<OwnOrderPage>> OwnOrderPage::open(const std::string &folder) {
-  OrderPageName name{this_process(), 0};
-  for (;; ++name.number) {
-    std::string path = path_of(folder, name);
-    const int descriptor = create_owned_file(path);
-    if (descriptor >= 0) {
-      ::close(descriptor);
-      return std::unique_ptr<OwnOrderPage>(new OwnOrderPage(name, std::move(path)));
-    }
-    if (errno != EEXIST || name.number == kMostExecutors) return not_possible(path, errno);
-  }
+  NewFile file = create_file(folder, "");
+  if (file.descriptor < 0) return not_possible(file.path, errno);
+  ::close(file.descriptor);
+  return std::unique_ptr<OwnOrderPage>(new OwnOrderPage(file.name, folder, std::move(file.path)));
 }
 
 OwnOrderPage::~OwnOrderPage() { ::unlink(path_.c_str()); }
 
 Result<void> OwnOrderPage::publish(const OrderStatement &statement) const {
-  const std::string path = path_ + std::string(kUnfinished);
-  const int descriptor = create_owned_file(path);
-  if (descriptor < 0) return not_possible(path, errno);
-  int error = write_all(descriptor, format_order(statement));
-  ::close(descriptor);
-  if (error == 0 && ::rename(path.c_str(), path_.c_str()) != 0) error = errno;
+  const NewFile file = create_file(folder_, kUnfinished);
+  if (file.descriptor < 0) return not_possible(file.path, errno);
+  int error = write_all(file.descriptor, format_order(statement));
+  ::close(file.descriptor);
+  if (error == 0 && ::rename(file.path.c_str(), path_.c_str()) != 0) error = errno;
   if (error == 0) return {};
-  ::unlink(path.c_str());
-  return not_possible(path, error);
+  ::unlink(file.path.c_str());
+  return not_possible(file.path, error);
 }
 
 }  // namespace redag::live

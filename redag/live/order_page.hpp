@@ -38,7 +38,7 @@ inline constexpr std::size_t kMostRates = 1000;
 /// Whose page it is: "redag-order.PID.START.NAMESPACE.N".
 struct OrderPageName {
   Process process;
-  std::uint32_t number = 0;  // of the executors of the process
+  std::uint32_t number = 0;  // at random; tells the executors of the process apart
 
   friend bool operator==(const OrderPageName &, const OrderPageName &) = default;
 };
@@ -57,7 +57,7 @@ struct OrderPage {
 /// The page of one executor. It exists from open() to the destructor.
 class OwnOrderPage {
  public:
-  /// Takes the first free number. The page states nothing yet. Error: what the system refused.
+  /// The page states nothing yet. Error: what the system refused.
   [[nodiscard]] static Result<std::unique_ptr<OwnOrderPage>> open(const std::string &folder);
   ~OwnOrderPage();
   OwnOrderPage(const OwnOrderPage &) = delete;
@@ -70,9 +70,11 @@ class OwnOrderPage {
   [[nodiscard]] const std::string &path() const { return path_; }
 
  private:
-  OwnOrderPage(OrderPageName name, std::string path) : name_(name), path_(std::move(path)) {}
+  OwnOrderPage(OrderPageName name, std::string folder, std::string path)
+      : name_(name), folder_(std::move(folder)), path_(std::move(path)) {}
 
   OrderPageName name_;
+  std::string folder_;
   std::string path_;
 };
 

@@ -3,6 +3,7 @@
 
 #include "redag/live/order_page.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/ptrace.h>
@@ -18,9 +19,11 @@ namespace redag::live {
 namespace {
 
 using ::testing::AnyOf;
+using ::testing::ElementsAre;
 using ::testing::Eq;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
+using ::testing::UnorderedElementsAre;
 
 TEST(OrderStatement, IsReadAsItWasWritten) {
   for (const OrderStatement &statement :
@@ -76,16 +79,13 @@ class OrderPages : public ::testing::Test {
 TEST_F(OrderPages, EachExecutorHasItsOwn) {
   const auto first = open();
   auto second = open();
-  EXPECT_EQ(first->name().number, 0U);
-  EXPECT_EQ(second->name().number, 1U);
+  EXPECT_FALSE(first->name() == second->name());
   EXPECT_THAT(read(), IsEmpty()) << "they state nothing yet";
   ASSERT_TRUE(first->publish({80, {5}}));
   ASSERT_TRUE(second->publish({70, {}}));
   ASSERT_TRUE(first->publish({80, {5, 6}}));
-  const std::vector<OrderPage> pages = read();
-  ASSERT_THAT(pages, SizeIs(2));
-  EXPECT_EQ(pages[0], (OrderPage{first->name(), {80, {5, 6}}}));
-  EXPECT_EQ(pages[1], (OrderPage{second->name(), {70, {}}}));
+  EXPECT_THAT(read(),
+              UnorderedElementsAre(OrderPage{first->name(), {80, {5, 6}}}, OrderPage{second->name(), {70, {}}}));
   second.reset();
   EXPECT_THAT(read(), SizeIs(1));
   EXPECT_EQ(files(), 1U);
@@ -98,6 +98,21 @@ TEST_F(OrderPages, APageThatSomeoneRemovedCanBePublishedAgain) {
   EXPECT_THAT(read(), IsEmpty());
   ASSERT_TRUE(page->publish({80, {5}}));
   EXPECT_THAT(read(), SizeIs(1));
+}
+
+// Everything that another user can compute beforehand is in the way: the names of the first pages, and the former name
+// of a page that is being written.
+TEST_F(OrderPages, FilesOfOthersAreNotInTheWay) {
+  const Process self = this_process();
+  const std::string names = fmt::format("{}/redag-order.{}.{}.{}.", folder_, self.pid, self.start, self.pid_namespace);
+  for (int number = 0; number <= 1001; ++number) {
+    std::ofstream(names + std::to_string(number));
+    std::ofstream(names + std::to_string(number) + ".new");
+  }
+  const auto page = open();
+  std::ofstream(page->path() + ".new");
+  ASSERT_TRUE(page->publish({80, {5}}));
+  EXPECT_THAT(read(), ElementsAre(OrderPage{page->name(), {80, {5}}}));
 }
 
 TEST_F(OrderPages, PagesThatOthersCouldHaveWrittenAreIgnored) {

@@ -18,13 +18,18 @@ AsyncEvent::~AsyncEvent() {
   REDAG_CHECK(state_->set_or_take_all() == nullptr, "an AsyncEvent is destroyed for which a job waits");
 }
 
-// A job that is woken may end, and with it the engine and this event. So each wait is read before its job is woken.
-void AsyncEvent::set() {
-  for (runtime::detail::Wait *wait = state_->set_or_take_all(); wait != nullptr;) {
-    runtime::detail::Wait *const next = wait->next;
-    wait->engine->wake(wait->job);
-    wait = next;
+void AsyncEvent::set() { runtime::Engine::wake_all(state_->set_or_take_all()); }
+
+void AsyncEvent::set_all(std::span<AsyncEvent *const> events) {
+  runtime::detail::Wait *all = nullptr;
+  for (AsyncEvent *const event : events) {
+    for (runtime::detail::Wait *wait = event->state_->set_or_take_all(); wait != nullptr;) {
+      runtime::detail::Wait *const next = wait->next;
+      wait->next = std::exchange(all, wait);
+      wait = next;
+    }
   }
+  runtime::Engine::wake_all(all);
 }
 
 bool AsyncEvent::take() { return state_->reset(); }

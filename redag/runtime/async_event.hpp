@@ -7,6 +7,7 @@
 
 #include <chrono>
 #include <memory>
+#include <span>
 
 #include "redag/runtime/coroutine.hpp"
 
@@ -24,6 +25,8 @@ class AsyncEvent {
   /// several calls then count as one. Takes the locks of the event and of the engine; allocates nothing. From any
   /// thread and any body, but not from a signal handler.
   void set();
+  /// set() of several. The jobs of an engine become ready together: the most urgent one goes on first.
+  static void set_all(std::span<AsyncEvent *const> events);
   /// Returns true, and takes it back, if set() was called and no job has awaited the event since then.
   [[nodiscard]] bool take();
 

@@ -223,6 +223,51 @@ TEST(Blocking, AJobYieldsToOneThatHasBlocked) {
   executor.run();
 }
 
+// A job that goes on after its call preempts one of two others, which keeps its thread. The spare thread is in use: no
+// other job can lend its worker, and none that is ready may start.
+TEST(Blocking, AJobThatYieldedUsesTheSpareThread) {
+  ExecutorOptions options = with_spare_threads(PreemptionMode::Cooperative);
+  options.policy = PolicyKind::Fixed;
+  options.workers = 2;
+  Executor executor(options);
+  std::latch both_run(2);
+  std::latch urgent_goes_on(1);
+  std::latch asked(1);
+  std::atomic<bool> urgent_ended{false};
+  executor.add(once("urgent",
+                    [&] {
+                      {
+                        const Blocking scope;
+                        EXPECT_TRUE(scope.lends());
+                        both_run.wait();
+                      }
+                      urgent_goes_on.count_down();
+                      asked.wait();
+                      urgent_ended = true;
+                    },
+                    {.priority = 4}));
+  executor.add(once("asks",
+                    [&] {
+                      both_run.count_down();
+                      urgent_goes_on.wait();
+                      {
+                        const Blocking scope;
+                        EXPECT_FALSE(scope.lends());
+                      }
+                      asked.count_down();
+                    },
+                    {.priority = 3}));
+  executor.add(once("yields",
+                    [&] {
+                      both_run.count_down();
+                      while (!urgent_ended) preemption_point();
+                    },
+                    {.priority = 2}));
+  executor.add(once("last", [&] { executor.stop(); }, {.priority = 1}));
+  executor.run();
+  EXPECT_TRUE(urgent_ended);
+}
+
 TEST_P(BlockingInEveryMode, TheStopWaitsForTheCall) {
   Executor executor(with_spare_threads(mode()));
   std::latch blocks(1);

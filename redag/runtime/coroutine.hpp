@@ -156,9 +156,21 @@ inline void Coroutine::Part::await_resume() const {
   return {{.wait = {.until = std::chrono::nanoseconds(time.time_since_epoch()).count()}}};
 }
 
+/// The time this long from now; the last one that there is if it is later.
+template <class Rep, class Period>
+[[nodiscard]] std::chrono::steady_clock::time_point from_now(std::chrono::duration<Rep, Period> duration) noexcept {
+  using std::chrono::nanoseconds;
+  using std::chrono::steady_clock;
+  const std::chrono::duration<double, std::nano> about = duration;
+  const bool is_endless = about.count() >= static_cast<double>(kMaxDuration);
+  const Duration exactly = is_endless ? kNever : std::chrono::duration_cast<nanoseconds>(duration).count();
+  const nanoseconds now = steady_clock::now().time_since_epoch();
+  return steady_clock::time_point(nanoseconds(saturated_add(now.count(), exactly)));
+}
+
 /// co_await sleep_for(d): as sleep_until(), `duration` from now.
 [[nodiscard]] inline runtime::detail::Sleep sleep_for(std::chrono::nanoseconds duration) noexcept {
-  return sleep_until(std::chrono::steady_clock::now() + duration);
+  return sleep_until(from_now(duration));
 }
 
 }  // namespace redag

@@ -8,7 +8,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
+#include <latch>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -55,6 +57,57 @@ TEST_P(EveryMode, TheWorkerRunsAnotherJobMeanwhile) {
   executor.add(std::move(server));
   executor.run();
   EXPECT_EQ(order, (std::vector<std::string>{"asks", "answers", "answered"}));
+}
+
+// The thread of the program finds the only worker idle. Whoever is woken first has it.
+TEST(Coroutine, OfThoseThatWaitForAnEventTheMostUrgentGoesOnFirst) {
+  ExecutorOptions options = one_worker();
+  options.policy = PolicyKind::Fixed;
+  Executor executor(options);
+  AsyncEvent event;
+  AsyncEvent other;
+  std::latch all_wait(1);
+  std::vector<int> order;
+  const auto waits_for = [&](AsyncEvent &its_event, int priority) {
+    executor.add(once("waits_" + std::to_string(priority),
+                      [&, priority]() -> Coroutine {
+                        co_await its_event;
+                        order.push_back(priority);
+                        if (order.size() == 4) executor.stop();
+                      },
+                      {.priority = priority}));
+  };
+  waits_for(event, 4);
+  waits_for(other, 5);
+  waits_for(event, 3);
+  waits_for(other, 2);
+  const DagId last = executor.add(once("last", [&] { all_wait.count_down(); }, {.priority = 1}));
+  executor.start();
+  all_wait.wait();
+  while (executor.stats(last)[0].jobs.finished == 0) std::this_thread::yield();
+  AsyncEvent::set_all(std::array{&event, &other});
+  executor.wait();
+  EXPECT_EQ(order, (std::vector<int>{5, 4, 3, 2}));
+}
+
+// "For ever" is no time in the past.
+TEST(Coroutine, ASleepWithoutEndIsEndedByTheStop) {
+  Executor executor(one_worker());
+  bool went_on = false;
+  bool cancelled = false;
+  executor.add(once("sleeps", [&]() -> Coroutine {
+    try {
+      co_await sleep_for(nanoseconds::max());
+      went_on = true;
+    } catch (const WaitCancelled &) {
+      cancelled = true;
+      throw;
+    }
+  }));
+  executor.add(once("later", [&] { executor.stop(); }, {.offset = 5ms}));
+  executor.run();
+  EXPECT_FALSE(went_on);
+  EXPECT_TRUE(cancelled);
 }
 
 TEST_P(EveryMode, AThreadOfTheProgramSetsAnEvent) {

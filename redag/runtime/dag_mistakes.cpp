@@ -15,6 +15,8 @@
 namespace redag::runtime {
 namespace {
 
+constexpr Duration kLeastPeriod = kMicrosecond;  // of a timer; releases of shorter ones would be all that a thread does
+
 /// Names what to change to mend a mistake in a field.
 struct Remedy {
   Field field;
@@ -111,6 +113,12 @@ std::string mistakes_of(const Dag &dag, PolicyKind policy) {
     if (finding.severity == Severity::Error) add(describe(finding, dag));
   }
   for (const Task &task : dag.tasks) {
+    if (task.activation == Activation::Timer && task.phase != Phase::Event && task.period > 0 &&
+        task.period < kLeastPeriod) {
+      add(fmt::format("{}: no thread can release jobs every {} (the period of a timer is at least {})",
+                      place_of(dag.name, call_of(task), task.name), format_duration(task.period),
+                      format_duration(kLeastPeriod)));
+    }
     if (task.overrun == Overrun::Queue || task.queue_depth == 1) continue;
     add(place_of(dag.name, call_of(task), task.name) +
         ": TaskOptions::queue_depth has no effect without a queue (set TaskOptions::overrun to Overrun::Queue)");

@@ -6,6 +6,7 @@
 #include "redag/runtime/device_handle.hpp"
 
 #include <gtest/gtest.h>
+#include <pthread.h>
 
 #include <algorithm>
 #include <atomic>
@@ -31,6 +32,22 @@ using testing::one_worker_and_gpu;
 using DeviceInEveryMode = testing::InEveryMode;
 
 INSTANTIATE_TEST_SUITE_P(, DeviceInEveryMode, testing::every_mode(), testing::mode_name);
+
+// A driver may wait actively. It must not keep more urgent jobs from the processor.
+TEST_P(DeviceInEveryMode, AServiceHasThePriorityOfItsJob) {
+  Executor executor(one_worker_and_gpu(mode()));
+  const DeviceHandle gpu = executor.device("gpu");
+  int of_job = -1;
+  int of_service = -2;
+  executor.add(once("client", [&]() -> Coroutine {
+    of_job = fifo_priority(::pthread_self());
+    const auto look = [&] { of_service = fifo_priority(::pthread_self()); };
+    co_await gpu.run(look);
+    executor.stop();
+  }));
+  executor.run();
+  EXPECT_EQ(of_service, of_job);
+}
 
 TEST_P(DeviceInEveryMode, ADeviceServesOneJobInEachSlot) {
   ExecutorOptions options = one_worker_and_gpu(mode());

@@ -3,6 +3,8 @@
 
 #include "redag/runtime/device_threads.hpp"
 
+#include <pthread.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -30,8 +32,8 @@ DeviceThreads::DeviceThreads(const std::vector<Device> &devices) : devices_(devi
 Result<void> DeviceThreads::start(const std::string &name, int priority, const Served &served) {
   for (const auto &thread : threads_) {
     const std::string its_name = name + "-" + devices_[thread->device.value].name;
-    Result<ThreadHandle> started =
-        start_thread({its_name, priority, {}}, [this, served, &self = *thread] { main(self, served); });
+    Result<ThreadHandle> started = start_thread(
+        {its_name, priority, {}}, [this, served, priority, &self = *thread] { main(self, priority, served); });
     if (!started) return tl::unexpected(started.error());
     thread->handle = *std::move(started);
     states_[thread->device.value].idle.push_back(thread.get());
@@ -49,7 +51,7 @@ void DeviceThreads::end() {
   ending_.store(false, std::memory_order_release);
 }
 
-void DeviceThreads::serve(detail::Wait &wait, TaskId task, Time now) {
+void DeviceThreads::serve(detail::Wait &wait, TaskId task, int priority, Time now) {
   State &state = states_[wait.device.value];
   REDAG_CHECK(!state.idle.empty(), "a device serves more jobs than it has slots");
   DeviceThread &thread = *state.idle.back();
@@ -57,6 +59,7 @@ void DeviceThreads::serve(detail::Wait &wait, TaskId task, Time now) {
   --state.queued;
   thread.task = task;
   thread.since = now;
+  thread.priority = priority;
   thread.wait = &wait;
   thread.parker.unpark();
 }
@@ -85,7 +88,7 @@ void DeviceThreads::figures(Time now, std::vector<DeviceFigures> &out) const {
   }
 }
 
-void DeviceThreads::main(DeviceThread &self, const Served &served) noexcept {
+void DeviceThreads::main(DeviceThread &self, int priority, const Served &served) noexcept {
   devices_of_this_thread = this;
   for (;;) {
     self.parker.park();
@@ -94,11 +97,14 @@ void DeviceThreads::main(DeviceThread &self, const Served &served) noexcept {
       if (ending_.load(std::memory_order_acquire)) return;
       continue;
     }
+    const bool is_raised = priority > 0;
+    if (is_raised) static_cast<void>(set_fifo_priority(::pthread_self(), self.priority));
     try {
       wait->function(wait->argument);
     } catch (...) {
       wait->exception = std::current_exception();
     }
+    if (is_raised) static_cast<void>(set_fifo_priority(::pthread_self(), priority));
     served(self, wait->job);
   }
 }

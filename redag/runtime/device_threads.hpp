@@ -31,8 +31,9 @@ struct DeviceFigures {
 
 struct DeviceThread {
   DeviceId device;
-  TaskId task;     // of the job that it serves; not valid: it is idle
-  Time since = 0;  // when this service began
+  TaskId task;       // of the job that it serves; not valid: it is idle
+  Time since = 0;    // when this service began
+  int priority = 0;  // of the service
   Parker parker;
   detail::Wait *wait = nullptr;  // to be served; written before a token is left, while the thread is idle
   ThreadHandle handle;
@@ -45,7 +46,8 @@ class DeviceThreads {
 
   explicit DeviceThreads(const std::vector<Device> &devices);
 
-  /// Creates the threads, named `name`-DEVICE. Error: what the system refused; call end().
+  /// Creates the threads, named `name`-DEVICE. They begin and end services at `priority`. Error: what the system
+  /// refused; call end().
   [[nodiscard]] Result<void> start(const std::string &name, int priority, const Served &served);
   /// Tells the threads to end, and waits for them. None serves a job. start() can be called again.
   void end();
@@ -55,7 +57,8 @@ class DeviceThreads {
   /// The job leaves the queue unserved, because its wait is cancelled.
   void leave(DeviceId device) { --states_[device.value].queued; }
   /// Lets an idle thread of the device serve a job of `task` that has asked it. The scheduler has found a free slot.
-  void serve(detail::Wait &wait, TaskId task, Time now);
+  /// With real-time threads, the function runs at the `priority` of the job: it may compute, or wait actively.
+  void serve(detail::Wait &wait, TaskId task, int priority, Time now);
   /// The thread has served a job.
   void end_service(DeviceThread &thread, Time now);
   /// Returns true if the calling thread is one of them. After start().
@@ -71,7 +74,7 @@ class DeviceThreads {
     Duration busy = 0;  // of services that have ended
   };
 
-  void main(DeviceThread &self, const Served &served) noexcept;
+  void main(DeviceThread &self, int priority, const Served &served) noexcept;
 
   std::vector<Device> devices_;
   std::vector<std::unique_ptr<DeviceThread>> threads_;

@@ -3,6 +3,8 @@
 
 #include "redag/runtime/engine.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <climits>
@@ -287,14 +289,18 @@ void Engine::release_at(std::span<const Release> releases, Time at) {
   } while (!releases.empty());
 }
 
-void Engine::miss(TaskId task, Time nominal, Reason reason) {
+void Engine::miss(std::span<const Release> releases, Reason reason) {
   const Time at = now();
-  Locked locked(*this);
-  withdraw_if_halting(locked);
-  if (halted_at_ != kNever) return;
-  scheduler_->miss(task, nominal, at, reason);
-  decide(locked, at);
-  locked.tell_nobody();
+  while (!releases.empty()) {
+    Locked locked(*this);
+    withdraw_if_halting(locked);
+    if (halted_at_ != kNever) return;
+    const auto lot = releases.first(std::min(releases.size(), sched::kMostReleasesAtOnce));
+    for (const Release &release : lot) scheduler_->miss(release.task, release.nominal, at, reason);
+    decide(locked, at);
+    locked.tell_nobody();
+    releases = releases.subspan(lot.size());
+  }
 }
 
 // ---- pauses ----
@@ -410,6 +416,34 @@ std::uint64_t Engine::thread_waits() const {
 std::uint64_t Engine::refused_priorities() const {
   const LockGuard guard(lock_);
   return placement_.refused_priorities();
+}
+
+std::vector<Problem> Engine::problems() const {
+  std::vector<Problem> problems;
+  if (const std::uint64_t changes = refused_priorities(); changes > 0) {
+    problems.push_back({fmt::format("the system refused {} changes of a thread's priority, so jobs may wait for less "
+                                    "urgent ones (the process needs the right to real-time priorities, CAP_SYS_NICE or "
+                                    "rtprio, for as long as it runs)",
+                                    changes),
+                        true});
+  }
+  {
+    const LockGuard guard(lock_);
+    if (!order_problem_.empty()) problems.push_back({order_problem_, true});
+  }
+  if (const std::uint64_t waits = thread_waits(); waits > 0) {
+    problems.push_back(
+        {fmt::format("jobs waited for a thread {} times, because all {} threads had jobs in progress "
+                     "(raise 'threads')",
+                     waits, pool_.size())});
+  }
+  if (const Duration gave_way = this->gave_way(); gave_way > 0) {
+    problems.push_back(
+        {fmt::format("jobs of lower criticality ran on ordinary threads for {}, so that the kernel's "
+                     "real-time throttling did not stop those of high criticality",
+                     humanize_duration(gave_way))});
+  }
+  return problems;
 }
 
 Time Engine::halted_at() const {

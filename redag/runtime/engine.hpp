@@ -119,6 +119,12 @@ struct TaskFigures {
   std::shared_ptr<const Histogram> end_to_end;  // of a sink: from the earliest release whose data it carries
 };
 
+/// Something that is not as the program asked or as the manual promises.
+struct Problem {
+  std::string text;
+  bool breaks_order = false;  // and still does: a job may have to wait for a less urgent one
+};
+
 /// The figures of one worker thread for a live view.
 struct ThreadFigures {
   Duration used = 0;  // processor time of the jobs that ended on it
@@ -171,8 +177,15 @@ class Engine {
   void release(const Release &release, Time at) { release_at(std::span(&release, 1), at); }
   /// Reports that what the job in this slot waits for has happened. From any thread.
   void wake(JobSlot job);
-  /// Reports a release that is skipped at once for `reason` (sched::Scheduler::miss).
-  void miss(TaskId task, Time nominal, Reason reason);
+  /// The same for a list of waits, by detail::Wait::next, of any engines. Each engine decides once, when it knows of
+  /// all its jobs.
+  static void wake_all(detail::Wait *waits);
+  /// Reports releases that are skipped at once for `reason` (sched::Scheduler::miss).
+  void miss(std::span<const Release> releases, Reason reason);
+  void miss(TaskId task, Time nominal, Reason reason) {
+    const Release release{task, nominal};
+    miss(std::span(&release, 1), reason);
+  }
 
   /// Reconfiguration while running. All of it allocates under the lock. `bodies` is in the DAG's task order; a DAG can
   /// have no tasks. sched::Scheduler says which tasks can be added and what ids they get.
@@ -242,8 +255,8 @@ class Engine {
   [[nodiscard]] Duration gave_way() const;
   /// How often a job could have had a processor but waited for a thread, because all threads had jobs.
   [[nodiscard]] std::uint64_t thread_waits() const;
-  /// Why this executor cannot state its rates to those that share an order with it; empty: it can.
-  [[nodiscard]] std::string order_problem() const;
+  /// What is not as promised, the worst first. The one list for all front ends.
+  [[nodiscard]] std::vector<Problem> problems() const;
   /// Priority changes that the system refused while running, because rights were taken away.
   [[nodiscard]] std::uint64_t refused_priorities() const;
   /// Returns true if the calling thread is inside one of this engine's bodies.
@@ -292,6 +305,7 @@ class Engine {
   Time wake_sleepers();
   void end_service(DeviceThread &thread, JobSlot job);
   void wake(Locked &locked, JobSlot job, Time at) REDAG_REQUIRES(lock_);
+  detail::Wait *wake_own(detail::Wait *waits);
   void wake_cancelled(Locked &locked, Time at) REDAG_REQUIRES(lock_);
   Time finish(Taker &taker, RunningJob &running, sched::Outcome outcome, Body &doomed);
   void count_late(const Job &job, TaskEntry &entry, Time at) REDAG_REQUIRES(lock_);

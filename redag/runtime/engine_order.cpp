@@ -104,9 +104,4 @@ Result<void> Engine::look_at_order() {
   return look.must_publish ? order_page_->publish(statement_) : Result<void>();
 }
 
-std::string Engine::order_problem() const {
-  const LockGuard guard(lock_);
-  return order_problem_;
-}
-
 }  // namespace redag::runtime

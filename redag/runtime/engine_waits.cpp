@@ -61,6 +61,7 @@ std::optional<Time> Engine::suspend(Taker &taker, RunningJob &running) {
     job.begun = running.begun;
     job.charged = running.charged;
     job.earlier = running.earlier + at - running.here_since;
+    job.level = self.level;
     job.measured = running.measured;
     job.used_wcet_low = running.used_wcet_low;
     job.used_budget = running.used_budget;
@@ -141,18 +142,40 @@ void Engine::wake(Locked &locked, JobSlot job, Time at) {
   scheduler_->wake(job, at);
 }
 
-// Once the lock is released, the job may end. join() then waits for `wakes_`.
 void Engine::wake(JobSlot job) {
+  detail::Wait wait;
+  wait.engine = this;
+  wait.job = job;
+  wake_all(&wait);
+}
+
+void Engine::wake_all(detail::Wait *waits) {
+  while (waits != nullptr) waits = waits->engine->wake_own(waits);
+}
+
+// Wakes the jobs of this engine, and returns the waits of others. After the decision the jobs may end, and with them
+// their waits and this engine: join() then waits for `wakes_`.
+detail::Wait *Engine::wake_own(detail::Wait *waits) {
+  detail::Wait *others = nullptr;
   const Time at = now();
   std::shared_ptr<InProgress> wakes;
   {
     Locked locked(*this);
     wakes = wakes_;
     wakes->begin();
-    wake(locked, job, at);
+    while (waits != nullptr) {
+      detail::Wait *const next = waits->next;
+      if (waits->engine == this) {
+        wake(locked, waits->job, at);
+      } else {
+        waits->next = std::exchange(others, waits);
+      }
+      waits = next;
+    }
     decide(locked, at);
   }
   static_cast<void>(wakes->end());
+  return others;
 }
 
 Time Engine::wake_sleepers() {

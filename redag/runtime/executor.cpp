@@ -84,6 +84,10 @@ Executor::Impl::Impl(ExecutorOptions options) : options_(std::move(options)) {
   engine_ = std::make_unique<Engine>(std::move(scheduler), std::move(engine));
   timer_ = std::make_unique<ReleaseTimer>([this](auto releases) { engine_->release(releases); }, 0);
   engine_->share_releases(timer_->thread());
+  if (options_.watchdog) {
+    watchdog_ =
+        std::make_unique<Watchdog>(*engine_, *options_.watchdog, [this](const OverdueJob &job) { on_overdue(job); });
+  }
   if (!options_.live) return;
   auto publisher = live::Publisher::start(live_options(options_.name, "threads", setup_.mode, setup_.config),
                                           [this](live::Sample &sample) { this->sample(sample); });
@@ -99,8 +103,10 @@ Executor::Impl::~Impl() {
   request_stop();
   timer_->join();
   // The watchdog watches until no body runs.
-  if (watchdog_) (void)engine_->wait_idle(kNever);
-  watchdog_.reset();
+  if (watchdog_) {
+    static_cast<void>(engine_->wait_idle(kNever));
+    watchdog_->stop();
+  }
   engine_->join();
   if (misses_) misses_->stop();
   finish_record();
@@ -153,7 +159,10 @@ bool Executor::Impl::begin(Time origin) {
 Result<void> Executor::Impl::start_threads() {
   const Result<void> timing = timer_->start(ThreadSetup{options_.name + "-timer", setup_.timer_priority(), {}});
   if (!timing) return timing;
-  if (const Result<void> watching = start_watchdog(); !watching) return watching;
+  if (watchdog_) {
+    const Result<void> watching = watchdog_->start({options_.name + "-watch", setup_.timer_priority(), {}});
+    if (!watching) return watching;
+  }
   if (misses_) {
     const Result<void> reporting = misses_->start(ThreadSetup{options_.name + "-misses", setup_.timer_priority(), {}});
     if (!reporting) return reporting;
@@ -166,15 +175,6 @@ Result<void> Executor::Impl::start_threads() {
   return engine_->start();
 }
 
-Result<void> Executor::Impl::start_watchdog() {
-  if (!options_.watchdog || watchdog_) return {};
-  auto watchdog =
-      std::make_unique<Watchdog>(*engine_, *options_.watchdog, [this](const OverdueJob &job) { on_overdue(job); });
-  Result<void> watching = watchdog->start({options_.name + "-watch", setup_.timer_priority(), {}});
-  if (watching) watchdog_ = std::move(watchdog);
-  return watching;
-}
-
 void Executor::Impl::on_overdue(const OverdueJob &job) {
   OverdueInfo info{{}, job.job.number, job.elapsed, job.used, {}};
   {
@@ -184,10 +184,14 @@ void Executor::Impl::on_overdue(const OverdueJob &job) {
     info.task = job.job.release < owner.since ? "a removed task" : name_of(owner);
   }
   info.text = fmt::format("{} #{} is overdue: {}", info.task, info.job, describe(job));
-  if (options_.on_overdue) {
-    options_.on_overdue(info);
-  } else {
+  if (!options_.on_overdue) {
     std::fprintf(stderr, "%s: %s\n", options_.name.c_str(), info.text.c_str());
+    return;
+  }
+  try {
+    options_.on_overdue(info);
+  } catch (...) {
+    fail(std::current_exception());
   }
 }
 
@@ -200,8 +204,8 @@ void Executor::Impl::request_stop() noexcept {
 void Executor::Impl::wait() {
   if (is_own_thread()) {
     throw std::logic_error(
-        "Executor::wait(): a body, or on_deadline_miss, cannot wait for the end of its own executor (call stop() "
-        "instead)");
+        "Executor::wait(): a body, on_deadline_miss or on_overdue cannot wait for the end of its own executor (call "
+        "stop() instead)");
   }
   if (!started_) throw std::logic_error("Executor::wait(): the executor is not started (call start() first)");
   stop_.wait();
@@ -220,7 +224,8 @@ void Executor::Impl::stop() {
 }
 
 bool Executor::Impl::is_own_thread() const {
-  return engine_->in_body() || engine_->in_service() || (misses_ && misses_->is_this_thread());
+  return engine_->in_body() || engine_->in_service() || (misses_ && misses_->is_this_thread()) ||
+         (watchdog_ && watchdog_->is_this_thread());
 }
 
 void Executor::Impl::finish() {
@@ -233,8 +238,11 @@ void Executor::Impl::finish() {
     throw std::runtime_error(fmt::format("bodies were still running {} after the stop: {}",
                                          format_duration(options_.stop_timeout.count()), fmt::join(names, ", ")));
   }
-  watchdog_.reset();
-  engine_->join();
+  if (watchdog_) watchdog_->stop();
+  {
+    const LockGuard adding(adding_);  // add() may create the engine's threads for waits
+    engine_->join();
+  }
   if (misses_) misses_->stop();
   live_.reset();
   finish_record();
@@ -245,8 +253,10 @@ void Executor::Impl::finish_record() {
   if (!recorder_) return;
   const Result<void> written = recorder_->finish(engine_->halted_at());
   if (written) return;
-  setup_.warnings.push_back("the run is not recorded: " + to_string(written.error()));
-  std::fprintf(stderr, "%s: %s\n", options_.name.c_str(), setup_.warnings.back().c_str());
+  std::string warning = "the run is not recorded: " + to_string(written.error());
+  std::fprintf(stderr, "%s: %s\n", options_.name.c_str(), warning.c_str());
+  const LockGuard guard(lock_);
+  setup_.warnings.push_back(std::move(warning));
 }
 
 void Executor::Impl::on_exception(const Job &job, std::exception_ptr exception) {
@@ -332,7 +342,7 @@ void Executor::stop() { impl_->stop(); }
 void Executor::request_stop() noexcept { impl_->request_stop(); }
 bool Executor::stopping() const noexcept { return impl_->engine().halting(); }
 const Mode &Executor::mode() const { return impl_->setup().mode; }
-const std::vector<std::string> &Executor::warnings() const { return impl_->setup().warnings; }
+std::vector<std::string> Executor::warnings() const { return impl_->warnings(); }
 const sched::Config &Executor::config() const { return impl_->engine().options().config; }
 void Executor::drain(std::vector<JobEvent> &events) { impl_->drain(events); }
 Time Executor::stopped_at() const { return impl_->engine().halted_at(); }

@@ -86,7 +86,8 @@ class Executor {
 
   /// The preemption mode, and why.
   [[nodiscard]] const Mode &mode() const;
-  [[nodiscard]] const std::vector<std::string> &warnings() const;
+  /// What is not as asked for or promised, so far. Any thread, at any time.
+  [[nodiscard]] std::vector<std::string> warnings() const;
   /// The scheduler's configuration. With the events it is all that a trace needs.
   [[nodiscard]] const sched::Config &config() const;
 

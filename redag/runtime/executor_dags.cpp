@@ -70,9 +70,8 @@ DagId Executor::Impl::add(Dag dag, std::vector<TaskBody> task_bodies, Sources so
       });
     }
   }
-  const LockGuard guard(lock_);
-  const auto has_name = [&](const auto &added) { return !added.second.removed && added.second.dag.name == dag.name; };
-  if (std::any_of(dags_.begin(), dags_.end(), has_name)) {
+  const LockGuard adding(adding_);
+  if (has_dag(dag.name)) {
     refuse("Executor::add(): " + place_of(dag.name) +
            ": another DAG in the executor has this name (remove() that one first, or choose another name)");
   }
@@ -85,6 +84,7 @@ DagId Executor::Impl::add(Dag dag, std::vector<TaskBody> task_bodies, Sources so
   if (has_coroutines) {
     if (const Result<void> ready = engine_->let_wait(); !ready) throw std::runtime_error(to_string(ready.error()));
   }
+  const LockGuard guard(lock_);
   const DagId id(next_dag_);
   const Time now = running_ ? std::max<Time>(0, engine_->now()) : 0;
   Added added{.dag = dag,
@@ -102,6 +102,12 @@ DagId Executor::Impl::add(Dag dag, std::vector<TaskBody> task_bodies, Sources so
   dags_.emplace(id.value, std::move(added));
   ++next_dag_;
   return id;
+}
+
+bool Executor::Impl::has_dag(const std::string &name) const {
+  const LockGuard guard(lock_);
+  return std::any_of(dags_.begin(), dags_.end(),
+                     [&](const auto &added) { return !added.second.removed && added.second.dag.name == name; });
 }
 
 // Records which task owns each id. A DAG's record is erased once later tasks own all of its ids.
@@ -130,8 +136,11 @@ Workload Executor::Impl::workload() const {
 
 void Executor::Impl::admit(const Dag &dag) const {
   Workload with = workload();
-  for (const auto &[id, other] : dags_) {
-    if (!other.removed) with.dags.push_back(other.dag);
+  {
+    const LockGuard guard(lock_);
+    for (const auto &[id, other] : dags_) {
+      if (!other.removed) with.dags.push_back(other.dag);
+    }
   }
   with.dags.push_back(dag);
   if (const Result<void> admitted = options_.admission(with, engine_->options().config); !admitted) {
@@ -198,6 +207,16 @@ DagStats Executor::Impl::stats(DagId dag) const {
         .task = name, .late = figures.late_end_to_end, .end_to_end = distribution_of(figures.end_to_end.get())});
   }
   return stats;
+}
+
+std::vector<std::string> Executor::Impl::warnings() const {
+  std::vector<std::string> warnings;
+  {
+    const LockGuard guard(lock_);
+    warnings = setup_.warnings;
+  }
+  for (Problem &problem : engine_->problems()) warnings.push_back(std::move(problem.text));
+  return warnings;
 }
 
 DeviceHandle Executor::Impl::device(std::string_view name) const {
@@ -267,7 +286,7 @@ void Executor::Impl::sample(live::Sample &sample) const {
   }
   add_threads(sample, *engine_);
   add_devices(sample, *engine_);
-  sample.alert = engine_->order_problem();
+  sample.alert = alert_of(*engine_);
 }
 
 }  // namespace redag::runtime

@@ -55,6 +55,7 @@ class Executor::Impl {
   void drain(std::vector<JobEvent> &events);
   [[nodiscard]] DagStats stats(DagId dag) const;
   [[nodiscard]] DeviceHandle device(std::string_view name) const;
+  [[nodiscard]] std::vector<std::string> warnings() const;
   [[nodiscard]] std::string task_name(TaskId task) const;
   [[nodiscard]] const Setup &setup() const { return setup_; }
   [[nodiscard]] const Engine &engine() const { return *engine_; }
@@ -77,10 +78,9 @@ class Executor::Impl {
   void finish();
   void finish_record();
   void disconnect_sources();
-  void admit(const Dag &dag) const REDAG_REQUIRES(lock_);
+  void admit(const Dag &dag) const REDAG_REQUIRES(adding_);
   void on_overdue(const OverdueJob &job);
   [[nodiscard]] Result<void> start_threads();
-  [[nodiscard]] Result<void> start_watchdog();
   [[nodiscard]] bool is_own_thread() const;
   void sample(live::Sample &sample) const;
   void on_exception(const Job &job, std::exception_ptr exception);
@@ -88,16 +88,19 @@ class Executor::Impl {
   void fail(std::exception_ptr exception);
   [[nodiscard]] trace::RunInfo run_info() const;
   [[nodiscard]] Workload workload() const;
+  [[nodiscard]] bool has_dag(const std::string &name) const;
   void own(DagId dag, const std::vector<TaskId> &tasks, Time since) REDAG_REQUIRES(lock_);
   [[nodiscard]] std::string name_of(const Owner &owner) const REDAG_REQUIRES(lock_);
 
   ExecutorOptions options_;
-  Setup setup_;
+  Setup setup_;                           // its warnings: under lock_ once the run has begun
   std::unique_ptr<MissReporter> misses_;  // on_deadline_miss
   std::unique_ptr<Recorder> recorder_;    // `record`
   std::unique_ptr<Engine> engine_;
   std::unique_ptr<ReleaseTimer> timer_;
-  std::unique_ptr<Watchdog> watchdog_;  // from start() until no body is left
+  std::unique_ptr<Watchdog> watchdog_;  // runs from start() until no body is left
+  Mutex adding_;  // held by the one thread that adds a DAG, also while options_.admission computes; taken before lock_
+  // Threads above all jobs take it: nothing that is long is done under it.
   mutable PiMutex lock_;
   // Without a trace the engine uses ids again. Memory then does not grow with the number of former DAGs.
   std::map<std::uint32_t, Added> dags_ REDAG_GUARDED_BY(lock_);  // by DagId

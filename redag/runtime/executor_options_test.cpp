@@ -92,6 +92,7 @@ TEST(Executor, NamesTheCallAndTheOptionOfEveryMistake) {
        "second argument of timer()"},
       {[](DagBuilder &dag) { dag.timer("t", -1ms, kBody); }, task.c_str(), "-1ms", "second argument of timer()"},
       {[](DagBuilder &dag) { dag.timer("t", nanoseconds::max(), kBody); }, task.c_str(), "too large", "timer()"},
+      {[](DagBuilder &dag) { dag.timer("t", 999ns, kBody); }, task.c_str(), "every 999ns", "at least 1us"},
       {[](DagBuilder &dag) { dag.timer("", 1ms, kBody); }, "timer(\"\")", "no name", "first argument"},
       {[](DagBuilder &dag) { dag.timer("\x1b[2J", 1ms, kBody); }, "timer(\"\\u{1B}[2J\")", "U+001B", "first argument"},
       {[](DagBuilder &dag) { dag.data("t", {}, kBody); }, ".data(\"t\")", "no predecessor",

@@ -10,7 +10,9 @@
 #include <algorithm>
 #include <atomic>
 #include <csignal>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include "redag/runtime/parker.hpp"
 #include "redag/runtime/preemption_point.hpp"
@@ -424,6 +426,44 @@ TEST(Executor, AsksWhetherADagIsAdmitted) {
   const DagId third = executor.add(dag("third"));
   EXPECT_EQ(executor.stats(third)[0].task, "third.t");
   EXPECT_EQ(asked, (std::vector<std::size_t>{1, 2, 1}));
+}
+
+// The analysis can take seconds. What threads above all jobs ask of the executor must not wait for it.
+TEST(Executor, ALongAdmissionHoldsUpNobody) {
+  ExecutorOptions options = one_worker();
+  Executor *running = nullptr;
+  options.admission = [&](const Workload &workload, const sched::Config &) -> Result<void> {
+    if (workload.dags.size() > 1) {
+      EXPECT_EQ(running->task_name(TaskId(0)), "first.task");
+    }
+    return {};
+  };
+  Executor executor(options);
+  running = &executor;
+  executor.add(once("first", [] {}));
+  executor.add(once("second", [] {}));
+}
+
+// As a daemon does: it starts with all rights, and then gives them up. In a process of its own, which they are lost to.
+TEST(Executor, SaysThatTheSystemRefusesPriorities) {
+  if (::geteuid() != 0 || available_fifo_priority(10) < 10) GTEST_SKIP() << "this process has no rights to lose";
+  const auto without_rights = [] {
+    Executor executor(one_worker(PreemptionMode::Os));
+    DagBuilder dag("dag");
+    std::atomic<int> jobs{0};
+    dag.timer("fast", 1ms, [&] { ++jobs; });
+    dag.timer("slow", 2ms, [&] { ++jobs; });
+    executor.add(std::move(dag));
+    executor.start();
+    const bool silent_before = executor.warnings().size() <= 1;  // throttling
+    if (::setuid(65534) != 0) ::_exit(2);
+    for (const int before = jobs; jobs < before + 20;) std::this_thread::sleep_for(1ms);
+    executor.stop();
+    const std::vector<std::string> warnings = executor.warnings();
+    const bool told = !warnings.empty() && warnings.back().find("refused") != std::string::npos;
+    ::_exit(silent_before && told ? 0 : 1);
+  };
+  EXPECT_EXIT(without_rights(), ::testing::ExitedWithCode(0), "");
 }
 
 }  // namespace

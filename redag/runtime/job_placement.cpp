@@ -43,7 +43,7 @@ void JobPlacement::place(const sched::Step &step, const Situation &situation, Ta
     if (&dispatch == own) continue;
     if (!needs_thread(dispatch)) {
       if (dispatch.kind == DispatchKind::Serve) {
-        waiting_.serve(dispatch.job, situation.now);
+        waiting_.serve(dispatch.job, os_ ? band_.of_level(waiting_.find(dispatch.job)->level) : 0, situation.now);
         continue;
       }
       if (const WaitingJob *woken = find_woken(dispatch)) {

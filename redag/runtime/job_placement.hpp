@@ -84,9 +84,10 @@ class JobPlacement {
   /// The thread's topmost job waits. It is among the waiting jobs until it has a thread again.
   void leave(WorkerThread &thread);
   /// The thread's topmost job blocks. It is among the waiting jobs until it has a worker again. Returns false, and
-  /// changes nothing, if that would leave too few threads for the jobs that have workers.
+  /// changes nothing, if that would leave too few threads for the jobs that have workers. A job that blocked and goes
+  /// on over another one leaves that one waiting on its thread: each spare thread has one of either kind.
   [[nodiscard]] bool lend(WorkerThread &thread) {
-    if (blocking_ == spare_) return false;
+    if (blocking_ + yielding_ >= spare_) return false;
     ++blocking_;
     leave(thread);
     return true;

@@ -52,6 +52,11 @@ void add_devices(live::Sample &sample, const Engine &engine) {
   }
 }
 
+std::string alert_of(const Engine &engine) {
+  const std::vector<Problem> problems = engine.problems();
+  return problems.empty() || !problems.front().breaks_order ? "" : problems.front().text;
+}
+
 live::PublisherOptions live_options(const std::string &name, const std::string &driver, const Mode &mode,
                                     const sched::Config &config) {
   live::PublisherOptions options;

@@ -22,6 +22,9 @@ void add_threads(live::Sample &sample, const Engine &engine, std::span<const Tas
 /// Appends the devices of `engine`. A task's key is its id.
 void add_devices(live::Sample &sample, const Engine &engine);
 
+/// What stops the engine, or breaks its order, now; empty: nothing.
+[[nodiscard]] std::string alert_of(const Engine &engine);
+
 [[nodiscard]] live::PublisherOptions live_options(const std::string &name, const std::string &driver, const Mode &mode,
                                                   const sched::Config &config);
 

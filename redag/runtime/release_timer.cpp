@@ -13,6 +13,8 @@ namespace redag::runtime {
 namespace {
 
 constexpr std::size_t kBatch = sched::kMostReleasesAtOnce;  // releases reported as one instant; more follow at once
+// Of one call. Between two calls the thread can be stopped, however late it is.
+constexpr Duration kLongest = 100 * kMillisecond;
 
 }  // namespace
 
@@ -51,12 +53,13 @@ void ReleaseTimer::begin(Time origin, Time horizon) {
 }
 
 Time ReleaseTimer::expire() {
-  for (;;) {
+  for (const Time end = monotonic_now() + kLongest;;) {
     // The lock is held during the report. When remove() gets it, no release of a removed task is under way.
     const LockGuard guard(lock_);
     if (origin_ == kNever) return kNever;
     due_.clear();
-    heap_.pop_due(std::min(monotonic_now() - origin_, horizon_ - 1), due_);
+    const Time now = monotonic_now();
+    if (now < end) heap_.pop_due(std::min(now - origin_, horizon_ - 1), due_);
     if (due_.empty()) return heap_.next() < horizon_ ? origin_ + heap_.next() : kNever;
     sink_(due_);
   }

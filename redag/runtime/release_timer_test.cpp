@@ -42,6 +42,17 @@ TEST(ReleaseTimer, ReportsExactlyTheGridUpToTheHorizon) {
   }
 }
 
+// The thread never catches up.
+TEST(ReleaseTimer, EndsAlthoughMoreReleasesAreDue) {
+  Event begun;
+  ReleaseTimer timer([&](std::span<const Release>) { begun.set(); }, 1);
+  timer.add(one_timer(1), std::array{TaskId(0)}, 0);
+  ASSERT_TRUE(timer.start(monotonic_now(), kNever, {}));
+  begun.wait();
+  timer.stop();
+  timer.join();
+}
+
 TEST(ReleaseTimer, AnEarlierReleaseAddedLaterWakesIt) {
   Collector collector;
   collector.wanted = 1;

@@ -15,9 +15,11 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <csignal>
 #include <cstring>
 #include <fstream>
 #include <functional>
+#include <optional>
 #include <system_error>
 #include <thread>
 #include <utility>
@@ -66,6 +68,25 @@ Result<void> pin(const ThreadSetup &setup) {
   const std::size_t amount = std::min(bytes, room - kReserve);
   auto *const page = static_cast<volatile char *>(__builtin_alloca(amount));
   for (std::size_t i = 0; i < amount; i += 1024) page[i] = 0;  // no page is smaller
+}
+
+// What a program that a body starts with fork() would otherwise inherit: all signals blocked, so that nothing but
+// SIGKILL ends it, and sleeps without slack.
+struct OfChildren {
+  sigset_t signals{};  // blocked
+  unsigned long slack = 0;
+};
+constinit thread_local std::optional<OfChildren> of_children;
+
+void set_up_child() noexcept {
+  if (!of_children) return;
+  pthread_sigmask(SIG_SETMASK, &of_children->signals, nullptr);
+  prctl(PR_SET_TIMERSLACK, of_children->slack, 0UL, 0UL, 0UL);
+}
+
+OfChildren like_this_thread(const BlockedSignals &inherited) {
+  if (of_children) return *of_children;
+  return {inherited.before(), static_cast<unsigned long>(prctl(PR_GET_TIMERSLACK))};
 }
 
 }  // namespace
@@ -144,15 +165,19 @@ struct ThreadStart::State {
 ThreadStart::ThreadStart(ThreadSetup setup, std::function<void()> main) : state_(std::make_shared<State>()) {
   state_->setup = std::move(setup);
   try {
+    static const int prepared = ::pthread_atfork(nullptr, nullptr, set_up_child);
+    static_cast<void>(prepared);
     const BlockedSignals inherited;
-    state_->thread = std::thread([state = state_, main = std::move(main)]() mutable {
-      state->result = set_up_this_thread(state->setup);
-      const bool usable = state->result.has_value();
-      state->ready.set();
-      state.reset();
-      if (usable) main();
-      leave_fifo();
-    });
+    state_->thread =
+        std::thread([state = state_, main = std::move(main), like = like_this_thread(inherited)]() mutable {
+          of_children = like;
+          state->result = set_up_this_thread(state->setup);
+          const bool usable = state->result.has_value();
+          state->ready.set();
+          state.reset();
+          if (usable) main();
+          leave_fifo();
+        });
   } catch (const std::system_error &error) {
     state_->result = make_error(fmt::format("thread '{}' cannot be created: {}", state_->setup.name, error.what()),
                                 "check the limits on threads: 'ulimit -u', the pids limit of the container, and memory "

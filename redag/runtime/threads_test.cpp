@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -68,6 +69,25 @@ TEST(Threads, TakeNoSignalsButThoseOfTheirOwnMistakes) {
   sigset_t of_caller;
   pthread_sigmask(SIG_SETMASK, nullptr, &of_caller);
   EXPECT_EQ(sigismember(&of_caller, SIGUSR1), 0) << "the caller's own are as before";
+}
+
+// A helper program that a body starts must end when the robot does.
+TEST(Threads, ProgramsThatTheyStartTakeSignals) {
+  int blocked = -1;
+  Result<ThreadHandle> thread = start_thread(ThreadSetup{"t", 0, {}}, [&] {
+    const pid_t child = ::fork();
+    if (child == 0) {
+      sigset_t mask;
+      pthread_sigmask(SIG_SETMASK, nullptr, &mask);
+      ::_exit(sigismember(&mask, SIGTERM) == 1 || prctl(PR_GET_TIMERSLACK) == 1 ? 1 : 0);
+    }
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    blocked = WEXITSTATUS(status);
+  });
+  ASSERT_TRUE(thread);
+  thread->join();
+  EXPECT_EQ(blocked, 0);
 }
 
 TEST(Threads, SayWhereTheyRun) {

@@ -86,10 +86,10 @@ JobSlot WaitingJobs::take_sleeper() {
   return first;
 }
 
-void WaitingJobs::serve(JobSlot slot, Time now) {
+void WaitingJobs::serve(JobSlot slot, int priority, Time now) {
   const WaitingJob &job = *by_slot_[slot.value];
   detail::Wait &wait = *job.wait;
-  if (!stopped_) return devices_.serve(wait, job.job.task, now);
+  if (!stopped_) return devices_.serve(wait, job.job.task, priority, now);
   devices_.leave(wait.device);
   wait.cancelled = true;
   cancelled_.push_back(slot);

@@ -36,6 +36,7 @@ struct WaitingJob {
   Time since = 0;        // of its last wait
   Duration waited = 0;   // its waits together, queues of devices included
   std::uint32_t waits = 0;
+  std::uint32_t level = 0;  // at which it ran
   bool measured = false;
   bool used_wcet_low = false;
   bool used_budget = false;
@@ -80,7 +81,7 @@ class WaitingJobs {
   void end(JobSlot slot, Time now);
   /// A device has a slot for the job: a thread of the device begins to serve it. After cancel_all() the job's wait is
   /// cancelled instead.
-  void serve(JobSlot slot, Time now);
+  void serve(JobSlot slot, int priority, Time now);
   /// A thread of a device has served a job.
   void end_service(DeviceThread &thread, Time now) { devices_.end_service(thread, now); }
 

@@ -11,6 +11,11 @@
 #include "redag/runtime/clock.hpp"
 
 namespace redag::runtime {
+namespace {
+
+thread_local const Watchdog *of_this_thread = nullptr;
+
+}  // namespace
 
 Watchdog::Watchdog(Engine &engine, WatchdogOptions options, Report report)
     : engine_(engine), options_(options), report_(std::move(report)) {
@@ -18,12 +23,16 @@ Watchdog::Watchdog(Engine &engine, WatchdogOptions options, Report report)
   overdue_.reserve(engine.thread_count());  // watch() appends under the engine's lock
 }
 
-Watchdog::~Watchdog() {
+bool Watchdog::is_this_thread() const { return of_this_thread == this; }
+
+void Watchdog::stop() {
+  if (!thread_.joinable()) return;
   stop_.set();
-  if (thread_.joinable()) thread_.join();
+  thread_.join();
 }
 
 Result<void> Watchdog::start(const ThreadSetup &setup) {
+  if (thread_.joinable()) return {};
   return start_thread(setup, [this] { main(); }).map([this](ThreadHandle &&thread) { thread_ = std::move(thread); });
 }
 
@@ -34,6 +43,7 @@ void Watchdog::look(Time as_of) {
 }
 
 void Watchdog::main() noexcept {
+  of_this_thread = this;
   while (!stop_.wait_until(monotonic_now() + options_.interval)) look(engine_.now());
 }
 

@@ -23,13 +23,16 @@ class Watchdog {
   using Report = std::function<void(const OverdueJob &)>;
 
   Watchdog(Engine &engine, WatchdogOptions options, Report report);
-  ~Watchdog();  // stops and joins
+  ~Watchdog() { stop(); }
   Watchdog(const Watchdog &) = delete;
   Watchdog &operator=(const Watchdog &) = delete;
 
   /// In real-time programs, use a priority above that of jobs: below it, a job that spins would keep the thread from
-  /// looking. Error: the thread cannot be set up as asked.
+  /// looking. If there is a thread already, does nothing. Error: the thread cannot be set up as asked.
   [[nodiscard]] Result<void> start(const ThreadSetup &setup);
+  /// Ends the thread. Not from a report.
+  void stop();
+  [[nodiscard]] bool is_this_thread() const;
 
   /// Looks once, as if it were `as_of`. The thread does nothing else.
   void look(Time as_of);

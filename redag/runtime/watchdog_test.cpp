@@ -304,6 +304,40 @@ TEST(Watchdog, NamesNoTaskThatCameLater) {
   EXPECT_THAT(names, Each(Not(HasSubstr("later"))));
 }
 
+// The natural answer to a job that is stuck.
+TEST(Watchdog, MayStopTheExecutor) {
+  std::vector<std::string> texts;
+  Event named;
+  ExecutorOptions options = watching(texts, named);
+  Executor *running = nullptr;
+  options.on_overdue = [&](const OverdueInfo &) {
+    running->stop();
+    EXPECT_THROW(running->wait(), std::logic_error);
+    named.set();
+  };
+  Executor executor(options);
+  running = &executor;
+  DagBuilder builder("control");
+  builder.timer("ekf", 1ms, [&] { named.wait(); });
+  executor.add(std::move(builder));
+  executor.run();
+}
+
+TEST(Watchdog, WhatItsHandlerThrowsComesOutOfRun) {
+  std::vector<std::string> texts;
+  Event named;
+  ExecutorOptions options = watching(texts, named);
+  options.on_overdue = [&](const OverdueInfo &) {
+    named.set();
+    throw std::runtime_error("the handler fails");
+  };
+  Executor executor(options);
+  DagBuilder builder("control");
+  builder.timer("ekf", 1ms, [&] { named.wait(); });
+  executor.add(std::move(builder));
+  EXPECT_THROW(executor.run(), std::runtime_error);
+}
+
 // The body that delays a stop is the one that must be reported.
 TEST(Watchdog, GoesOnWhileTheExecutorStops) {
   std::vector<std::string> texts;

@@ -45,6 +45,8 @@ constexpr std::uint64_t kEndBytes = kHeaderBytes + sizeof(EndBlock);
 constexpr int kLevel = 1;
 
 constexpr std::uint64_t kMostExpansion = 1032;  // of zlib: a block that claims more is a lie
+// A description becomes trees of JSON and YAML, many times its size. The most regular ones expand some 60 times.
+constexpr std::uint64_t kMostInfoExpansion = 100;
 
 std::uint32_t checksum(const BlockHeader &header, std::string_view bytes) {
   std::array<unsigned char, kHeaderBytes> head;
@@ -127,7 +129,7 @@ class BlockSource final : public EventsSource {
 
   Result<void> begin() {
     if (Result<void> last = read_end(); !last) return last;
-    if (Result<void> run = read_block(BlockKind::Run, kMaxInfoBytes); !run) return run;
+    if (Result<void> run = read_block(BlockKind::Run, kMaxInfoBytes, kMostInfoExpansion); !run) return run;
     Result<RunInfo> read = run_header_from_json(whole_, kBlockFormat, "an event trace", file_.name());
     if (!read) return tl::unexpected<Diagnostics>(std::move(read.error()));
     info = *std::move(read);
@@ -166,11 +168,11 @@ class BlockSource final : public EventsSource {
   }
 
   // Reads the block at `offset_` into `whole_`, and goes behind it.
-  Result<void> read_block(BlockKind kind, std::uint64_t most) {
+  Result<void> read_block(BlockKind kind, std::uint64_t most, std::uint64_t expansion = kMostExpansion) {
     const Result<std::string_view> bytes = read_checked(offset_);
     if (!bytes) return tl::unexpected<Diagnostics>(bytes.error());
     if (header_.kind != kind) return bad_block("this is not the block that is due here");
-    if (header_.whole > most || header_.whole > kMostExpansion * (std::uint64_t{header_.bytes} + 1))
+    if (header_.whole > most || header_.whole > expansion * (std::uint64_t{header_.bytes} + 1))
       return bad_block("the block is longer than a block can be");
     whole_.resize(header_.whole);
     uLongf size = header_.whole;

@@ -67,6 +67,16 @@ class EventsBlocks : public ::testing::Test {
       (fs::path(::testing::TempDir()) / ("redag_blocks." + std::to_string(::getpid()) + ".redag")).string();
 };
 
+// A small file must not become a large tree.
+TEST_F(EventsBlocks, ADescriptionThatExpandsTooMuchIsRefused) {
+  Trace trace = trace_of(1);
+  trace.info.preemption_why = std::string(2'000'000, 'x');
+  EXPECT_LT(written(trace).size(), 20'000U);
+  const Result<Trace> read = read_trace(path_);
+  ASSERT_FALSE(read);
+  EXPECT_THAT(to_string(read.error()), HasSubstr("byte 16: the block is longer than a block can be"));
+}
+
 TEST_F(EventsBlocks, AllEventsAreReadBackBlockByBlock) {
   for (const std::size_t count : {std::size_t{0}, std::size_t{1}, kMostBlockEvents, 2 * kMostBlockEvents + 77}) {
     const Trace before = trace_of(count);

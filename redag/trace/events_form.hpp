@@ -49,9 +49,6 @@ inline constexpr std::string_view kBlockFormat = "redag.events/2";
 inline constexpr std::string_view kBlockMagic = "redag.events/2\r\n";
 static_assert(kBlockMagic.size() == 16);
 
-/// The longest description of a run.
-inline constexpr std::uint64_t kMaxInfoBytes = std::uint64_t{1} << 30U;
-
 /// Both write the description of the run into `file`.
 [[nodiscard]] std::unique_ptr<EventsSink> text_sink(OutputFile file, const RunInfo &info);
 [[nodiscard]] std::unique_ptr<EventsSink> block_sink(OutputFile file, const RunInfo &info);

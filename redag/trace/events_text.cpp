@@ -82,7 +82,7 @@ bool read_event(std::string_view line, JobEvent &event) {
 bool is_a_time(std::int64_t time) { return time >= -kMaxTraceTime && time <= kMaxTraceTime; }
 
 std::optional<EventsFooter> read_footer(std::string_view line) {
-  if (line.empty() || line.front() != '{' || json_nests_deeper(line)) return std::nullopt;
+  if (line.empty() || line.front() != '{' || json_is_too_large(line)) return std::nullopt;
   const nlohmann::json json = nlohmann::json::parse(line, nullptr, false);
   if (!json.is_object()) return std::nullopt;
   const auto events = json.find("events");
@@ -191,7 +191,7 @@ class TextSource final : public EventsSource {
       const bool is_rest = offset_ + chunk->size() >= file_.size() || chunk->size() < count;
       const std::size_t feed = chunk->rfind('\n');
       if (!is_rest && feed == std::string_view::npos) {
-        if (count > kMaxInfoBytes) return bad_line("the line is longer than 1 GiB");
+        if (count > kMaxInfoBytes) return bad_line("the line is longer than 64 MiB");
         continue;
       }
       const std::string_view lines = is_rest ? *chunk : chunk->substr(0, feed + 1);

@@ -38,7 +38,6 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kFormat = "redag.flight/1";
 constexpr std::size_t kBlockBytes = 4096;  // a page: if the process is killed, it is either the old or the new one
-constexpr std::uint64_t kMaxInfoBytes = std::uint64_t{1} << 30U;
 
 struct FlightHeader {
   std::uint32_t crc = 0;       // of all later bytes in the block
@@ -297,7 +296,7 @@ Result<Description> read_info(const std::string &folder) {
   const std::string_view rest = line == std::string::npos ? "" : std::string_view(*text).substr(line + 1);
   if (rest.empty()) return found;
   const nlohmann::json positions =
-      json_nests_deeper(rest) ? nlohmann::json() : nlohmann::json::parse(rest, nullptr, false);
+      json_is_too_large(rest) ? nlohmann::json() : nlohmann::json::parse(rest, nullptr, false);
   const std::size_t tasks = found.info.workload.task_count();
   const auto is_position = [tasks](const nlohmann::json &entry) {
     return entry.is_number_unsigned() && entry.get<std::uint64_t>() < tasks;

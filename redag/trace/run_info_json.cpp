@@ -217,7 +217,8 @@ std::string run_info_to_json(const RunInfo &info) {
 }
 
 Result<RunInfo> run_info_from_json(std::string_view text, const std::string &file, int line) {
-  if (json_nests_deeper(text)) return file_error(file, line, "the description of the run is nested too deeply");
+  if (json_is_too_large(text))
+    return file_error(file, line, "the description of the run is nested too deeply, or has too many values");
   try {
     const Json json = Json::parse(text);
     if (!json.is_object()) return file_error(file, line, "the description of the run must be an object");
@@ -246,7 +247,7 @@ std::string run_header_to_json(std::string_view format, const RunInfo &info) {
 Result<RunInfo> run_header_from_json(std::string_view text, std::string_view format, const char *what,
                                      const std::string &file) {
   const std::string wrong = std::string("not ") + what + ": ";
-  if (json_nests_deeper(text)) return file_error(file, 1, wrong + "nested too deeply");
+  if (json_is_too_large(text)) return file_error(file, 1, wrong + "nested too deeply, or too many values");
   const Json json = Json::parse(text, nullptr, false);
   const auto given = json.is_object() ? json.find("format") : json.end();
   if (!json.is_object() || given == json.end() || *given != format || !json.contains("run")) {

@@ -5,6 +5,7 @@
 // YAML text. Pure functions.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 
@@ -12,6 +13,9 @@
 #include "redag/trace/trace.hpp"
 
 namespace redag::trace {
+
+/// The longest description of a run that is read. Its workload has at most kMaxWorkloadBytes.
+inline constexpr std::uint64_t kMaxInfoBytes = std::uint64_t{64} << 20U;
 
 /// Returns one line without a line break. Requires that validate(info.workload) finds no errors but a missing wcet, and
 /// allows waits.

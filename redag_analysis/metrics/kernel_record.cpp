@@ -213,7 +213,7 @@ class KernelReader::Impl {
 
  private:
   static Json parsed(std::string_view line) {
-    return json_nests_deeper(line) ? Json() : Json::parse(line, nullptr, false);
+    return json_is_too_large(line) ? Json() : Json::parse(line, nullptr, false);
   }
 
   [[nodiscard]] tl::unexpected<Diagnostics> error(std::string message, std::string hint = {}) const {

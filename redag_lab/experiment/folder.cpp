@@ -208,7 +208,7 @@ std::vector<std::string> read_runs(const std::vector<std::string> &folders) {
       const std::size_t end = rest.find('\n');
       if (end == std::string_view::npos) break;  // the process was killed while it wrote this line
       const std::string_view line = rest.substr(0, end);
-      if (!json_nests_deeper(line) && Json::accept(line)) lines.emplace_back(line);
+      if (!json_is_too_large(line) && Json::accept(line)) lines.emplace_back(line);
       rest.remove_prefix(end + 1);
     }
   }

@@ -151,7 +151,7 @@ Result<void> Arrangement::load() {
     return trace::file_error(path_, 0, fmt::format("is not the state of an arrangement: {}", why),
                              "name another file with --state");
   };
-  if (json_nests_deeper(*text)) return refuse("it is nested too deeply");
+  if (json_is_too_large(*text)) return refuse("it is nested too deeply, or has too many values");
   try {
     const Json json = Json::parse(*text);
     if (json.at("format") != kFormat) return refuse("it has another format");

@@ -442,21 +442,9 @@ class Run {
   }
 
   void warn() {
-    const auto gave_up = [](const runtime::Engine &engine) { return engine.gave_way(); };
-    if (const Duration gave_way = sum(gave_up); gave_way > 0) {
-      result_.warnings.push_back(
-          fmt::format("jobs of lower criticality ran on ordinary threads for {}, so that the kernel's real-time "
-                      "throttling did not stop those of high criticality",
-                      humanize_duration(gave_way)));
-    }
-    const auto waited = [](const runtime::Engine &engine) { return engine.thread_waits(); };
-    if (const std::uint64_t waits = sum(waited); waits > 0) {
-      result_.warnings.push_back(fmt::format("{} time{} a job waited for a thread, because all {} had jobs in progress",
-                                             waits, waits == 1 ? "" : "s", instances_.front()->engine->thread_count()));
-    }
-    const auto refused = [](const runtime::Engine &engine) { return engine.refused_priorities(); };
-    if (const std::uint64_t changes = sum(refused); changes > 0) {
-      result_.warnings.push_back(fmt::format("the kernel refused {} priority changes", changes));
+    for (const auto &instance : instances_) {
+      for (runtime::Problem &problem : instance->engine->problems())
+        result_.warnings.push_back(std::move(problem.text));
     }
     if (!result_.unfinished.empty()) {
       result_.warnings.push_back(fmt::format("jobs not finished {} after the end: {}",

@@ -66,7 +66,7 @@ bool Report::set(std::shared_ptr<void> value) {
   if (state_->is_abandoned) return false;
   state_->is_set = true;
   state_->value = std::move(value);
-  for (redag::AsyncEvent *const event : state_->waiting) event->set();
+  redag::AsyncEvent::set_all(state_->waiting);
   return true;
 }
 

@@ -70,12 +70,14 @@ bool AwaitedCalls::wake(std::size_t count) {
 // Wakes one job of each task: jobs of different tasks can have different priorities, and none of them may depend on a
 // less urgent one to take its response.
 void AwaitedCalls::wake_callers() {
+  woken_.clear();
   for (auto call = calls_.begin(); call != calls_.end(); ++call) {
     const auto is_of_task = [&](const Call *other) {
       return other->task_ == (*call)->task_ && other->engine_ == (*call)->engine_;
     };
-    if (std::none_of(calls_.begin(), call, is_of_task)) (*call)->event_.set();
+    if (std::none_of(calls_.begin(), call, is_of_task)) woken_.push_back(&(*call)->event_);
   }
+  redag::AsyncEvent::set_all(woken_);
 }
 
 AwaitedCalls::Call *AwaitedCalls::give(const Response &response) {

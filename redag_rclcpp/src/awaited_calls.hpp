@@ -106,9 +106,10 @@ class AwaitedCalls {
   redag::PiMutex lock_;    // taken after it
   std::weak_ptr<ResponseCallback> callback_ REDAG_GUARDED_BY(lock_);
   std::vector<Call *> calls_ REDAG_GUARDED_BY(lock_);
-  std::size_t arrived_ REDAG_GUARDED_BY(lock_) = 0;         // in the middleware, and no arrival of the callback
-  std::vector<Response> unknown_ REDAG_GUARDED_BY(lock_);   // may be that of a request which is being sent
-  std::deque<Response> set_aside_ REDAG_GUARDED_BY(lock_);  // for the client's callback
+  std::vector<redag::AsyncEvent *> woken_ REDAG_GUARDED_BY(lock_);  // wake_callers() only
+  std::size_t arrived_ REDAG_GUARDED_BY(lock_) = 0;                 // in the middleware, and no arrival of the callback
+  std::vector<Response> unknown_ REDAG_GUARDED_BY(lock_);           // may be that of a request which is being sent
+  std::deque<Response> set_aside_ REDAG_GUARDED_BY(lock_);          // for the client's callback
 };
 
 }  // namespace redag_rclcpp

@@ -28,6 +28,7 @@
 namespace redag_rclcpp {
 
 using redag::kNever;
+using redag::saturated_add;
 using redag::Workload;
 using redag::runtime::monotonic_now;
 using std::chrono::nanoseconds;
@@ -474,7 +475,7 @@ void ReDAGExecutor::Core::stop_workers() {
 }
 
 void ReDAGExecutor::Core::spin_ready(nanoseconds max_duration, bool exhaustive) {
-  const redag::Time end = max_duration.count() == 0 ? kNever : engine_->now() + max_duration.count();
+  const redag::Time end = max_duration.count() == 0 ? kNever : saturated_add(engine_->now(), max_duration.count());
   bool first = true;  // it runs also if the time is over: collecting entities can take longer
   bool again = true;
   while (again) {
@@ -488,7 +489,7 @@ void ReDAGExecutor::Core::spin_ready(nanoseconds max_duration, bool exhaustive) 
 }
 
 void ReDAGExecutor::Core::spin_one(nanoseconds timeout) {
-  const redag::Time end = timeout.count() < 0 ? kNever : engine_->now() + timeout.count();
+  const redag::Time end = timeout.count() < 0 ? kNever : saturated_add(engine_->now(), timeout.count());
   admit(true);
   while (hooks_.may_spin() && !run_one()) {
     const redag::Time now = engine_->now();
@@ -539,12 +540,7 @@ void ReDAGExecutor::Core::stop_learning() {
 std::vector<std::string> ReDAGExecutor::Core::warnings() const {
   std::vector<std::string> all = notes_.warnings();
   for (std::string &line : registry_.unmatched()) all.push_back(std::move(line));
-  if (const std::uint64_t waits = engine_->thread_waits(); waits > 0) {
-    all.push_back(
-        fmt::format("callbacks waited for a thread {} times, because all {} threads had callbacks in progress: raise "
-                    "the parameter 'threads'",
-                    waits, engine_->thread_count()));
-  }
+  for (redag::runtime::Problem &problem : engine_->problems()) all.push_back(std::move(problem.text));
   return all;
 }
 
@@ -552,7 +548,7 @@ std::vector<std::string> ReDAGExecutor::Core::warnings() const {
 std::string ReDAGExecutor::Core::alert() const {
   std::vector<Deadlock> lasting = notes_.deadlocks();
   std::erase_if(lasting, [](const Deadlock &deadlock) { return deadlock.ended != kNever; });
-  if (lasting.empty()) return engine_->order_problem();
+  if (lasting.empty()) return redag::runtime::alert_of(*engine_);
   const Deadlock &first = lasting.front();
   std::string text =
       fmt::format("{}: {} waits for {}, which cannot get {}", first.certain ? "deadlock" : "possible deadlock",

@@ -17,7 +17,7 @@ using std::chrono::steady_clock;
 namespace {
 
 steady_clock::time_point end_of(ParametersClient::Timeout timeout) {
-  return timeout == ParametersClient::kNoLimit ? steady_clock::time_point::max() : detail::from_now(timeout);
+  return timeout == ParametersClient::kNoLimit ? steady_clock::time_point::max() : redag::from_now(timeout);
 }
 
 template <class Request>

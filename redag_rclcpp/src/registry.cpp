@@ -263,6 +263,8 @@ void Registry::place(TaskTable::Entry &entry, const Entity &found) {
   }
   if (task.period == 0) task.period = entry.id.period > 0 ? entry.id.period : options_.default_period.count();
   if (task.deadline == 0) task.deadline = task.period;
+  task.period = std::min(task.period, redag::kMaxDuration);  // some timers mean "never"
+  task.deadline = std::min(task.deadline, redag::kMaxDuration);
   // ROS decides what releases the jobs, and which jobs must not overlap.
   task.activation = redag::Activation::Timer;
   task.predecessors.clear();

@@ -14,6 +14,7 @@
 namespace redag_rclcpp {
 
 using redag::kNever;
+using redag::saturated_add;
 using redag::runtime::Release;
 
 namespace {
@@ -180,7 +181,7 @@ void TimerCallback::look() {
 
 void TimerCallback::reschedule() {
   const TimerReading reading = read_timer(*handle_, engine());
-  Time due = reading.now + reading.until;
+  Time due = saturated_add(reading.now, reading.until);
   if (reading.cancelled || (reading.until > 0 && is_simulated(*handle_))) due = kNever;
   const redag::LockGuard guard(lock_);
   if (context() && context()->timers().schedule(*this, due)) context()->timers_changed();
@@ -192,7 +193,7 @@ Time TimerCallback::expire(Time now, std::vector<Release> &releases, std::vector
   if (follows && simulated) return kNever;  // see begin_instant()
   const TimerReading reading = read_timer(*handle_, engine());
   if (reading.cancelled) return kNever;
-  if (reading.until > 0) return simulated ? kNever : reading.now + reading.until;
+  if (reading.until > 0) return simulated ? kNever : saturated_add(reading.now, reading.until);
   if ((follows || (simulated && lockstep() != nullptr)) && !is_ros_internal(id())) lockstep()->came_from_outside(*this);
 
   const Duration period = period_of(*handle_);
@@ -217,7 +218,7 @@ Time TimerCallback::expire(Time now, std::vector<Release> &releases, std::vector
     uncalled_ = true;
     releases.push_back(Release{task(), nominal});
   }
-  return nominal + period;
+  return saturated_add(nominal, period);
 }
 
 // An instant calls each timer that is due once, also one with a period of 0.

@@ -8,10 +8,15 @@
 #include <utility>
 
 namespace redag_rclcpp {
+namespace {
+
+bool is_same(Time a, Time b) { return std::max(a, b) < redag::saturated_add(std::min(a, b), kSame); }
+
+}  // namespace
 
 bool TimerQueue::schedule(Timer &timer, Time due) {
   const redag::LockGuard guard(lock_);
-  if (timer.position_ != kNowhere && due != redag::kNever && std::abs(timer.due_ - due) < kSame) return false;
+  if (timer.position_ != kNowhere && due != redag::kNever && is_same(timer.due_, due)) return false;
   const Time before = heap_.empty() ? redag::kNever : heap_.front()->due_;
   place(timer, due);
   return !heap_.empty() && heap_.front()->due_ < before;

@@ -64,7 +64,7 @@ Result<void> read_comparison(const fs::path &file, std::vector<std::string> &ord
   const Result<std::string> text = trace::read_file(file.string());
   if (!text) return tl::unexpected<Diagnostics>(text.error());
   const auto bad = [&] { return trace::file_error(file.string(), 1, "the file was not written by 'redag compare'"); };
-  if (json_nests_deeper(*text)) return bad();
+  if (json_is_too_large(*text)) return bad();
   const Json json = Json::parse(*text, nullptr, false);
   if (!json.is_object() || !is_comparison(json.value("format", Json()))) return bad();
   for (const Json &executor : json.value("executors", Json::array())) {
@@ -86,7 +86,7 @@ std::size_t place_in(const std::vector<std::string> &order, const fs::path &subj
 // Returns how many deadlines a run missed, as its summary.json says; 0 without one.
 std::uint64_t missed_in(const std::string &trace) {
   const Result<std::string> text = trace::read_file((fs::path(trace).parent_path() / "summary.json").string());
-  if (!text || json_nests_deeper(*text)) return 0;
+  if (!text || json_is_too_large(*text)) return 0;
   const Json json = Json::parse(*text, nullptr, false);
   if (!json.is_object() || !json.contains("total") || !json["total"].is_object()) return 0;
   const Json missed = json["total"].value("missed", Json());

@@ -150,7 +150,7 @@ class Goal {
   /// The same with a limit: returns null if the goal has not ended by then. The goal goes on.
   template <class Rep, class Period>
   [[nodiscard]] detail::GoalResult<Action> result(std::chrono::duration<Rep, Period> timeout) const {
-    return {accepted().result, detail::from_now(timeout)};
+    return {accepted().result, redag::from_now(timeout)};
   }
   /// co_await cancel(): asks the server to cancel the goal, and returns its answer (action_msgs/srv/CancelGoal). The
   /// goal has ended when result() says so.
@@ -160,7 +160,7 @@ class Goal {
   /// The same with a limit: returns null if there is no answer by then.
   template <class Rep, class Period>
   [[nodiscard]] detail::CancelGoal<Action> cancel(std::chrono::duration<Rep, Period> timeout) const {
-    return {accepted(), detail::from_now(timeout)};
+    return {accepted(), redag::from_now(timeout)};
   }
 
  private:
@@ -276,7 +276,7 @@ template <class Action, class Rep, class Period>
 [[nodiscard]] detail::SendGoal<Action> send_goal(const std::shared_ptr<rclcpp_action::Client<Action>> &client,
                                                  typename Action::Goal goal,
                                                  std::chrono::duration<Rep, Period> timeout) {
-  return {client, std::move(goal), nullptr, detail::from_now(timeout)};
+  return {client, std::move(goal), nullptr, redag::from_now(timeout)};
 }
 /// Both with a function that is called with the goal's handle and its feedback, as long as a copy of the Goal exists.
 /// If the client is in the group of the callback that waits, this happens while that callback awaits something of the
@@ -292,7 +292,7 @@ template <class Action, class Rep, class Period, detail::IsFeedback<Action> Func
                                                  typename Action::Goal goal, std::chrono::duration<Rep, Period> timeout,
                                                  Function &&feedback) {
   return {client, std::move(goal), detail::as_feedback<Action>(std::forward<Function>(feedback)),
-          detail::from_now(timeout)};
+          redag::from_now(timeout)};
 }
 
 }  // namespace redag_rclcpp

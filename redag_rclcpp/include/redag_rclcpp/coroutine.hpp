@@ -163,12 +163,6 @@ class ClockSleep : public Awaitable<ClockSleep> {
   rclcpp::Time until_;
 };
 
-/// When a wait with this limit ends.
-template <class Rep, class Period>
-[[nodiscard]] std::chrono::steady_clock::time_point from_now(std::chrono::duration<Rep, Period> timeout) {
-  return std::chrono::steady_clock::now() + std::chrono::duration_cast<std::chrono::nanoseconds>(timeout);
-}
-
 }  // namespace detail
 
 /// A callback for subscriptions, timers, responses and the like, from a function with the same arguments that returns
@@ -231,7 +225,7 @@ template <class Service, class Rep, class Period>
 [[nodiscard]] detail::Call<Service> call(const std::shared_ptr<rclcpp::Client<Service>> &client,
                                          std::shared_ptr<typename Service::Request> request,
                                          std::chrono::duration<Rep, Period> timeout) {
-  return {client, std::move(request), detail::from_now(timeout)};
+  return {client, std::move(request), redag::from_now(timeout)};
 }
 
 }  // namespace redag_rclcpp

@@ -6,9 +6,11 @@
 #include <fmt/format.h>
 #include <pthread.h>
 #include <sched.h>
+#include <sys/prctl.h>
 
 #include <algorithm>
 #include <array>
+#include <csignal>
 #include <cstdint>
 #include <cstdio>
 #include <future>
@@ -102,12 +104,16 @@ class ThreadTraits {
     pthread_getschedparam(pthread_self(), &policy_, &parameters_);
     pthread_getaffinity_np(pthread_self(), sizeof(processors_), &processors_);
     pthread_getname_np(pthread_self(), name_.data(), name_.size());
+    pthread_sigmask(SIG_SETMASK, nullptr, &signals_);
+    slack_ = prctl(PR_GET_TIMERSLACK);
   }
 
   /// Gives them to the calling thread. False: the system refused one of them.
   [[nodiscard]] bool apply() const {
     const bool is_set = pthread_setschedparam(pthread_self(), policy_, &parameters_) == 0 &&
                         pthread_setaffinity_np(pthread_self(), sizeof(processors_), &processors_) == 0;
+    pthread_sigmask(SIG_SETMASK, &signals_, nullptr);
+    prctl(PR_SET_TIMERSLACK, static_cast<unsigned long>(slack_), 0UL, 0UL, 0UL);
     return pthread_setname_np(pthread_self(), name_.data()) == 0 && is_set;
   }
 
@@ -116,6 +122,8 @@ class ThreadTraits {
   sched_param parameters_{};
   cpu_set_t processors_{};
   std::array<char, 16> name_{};
+  sigset_t signals_{};  // blocked
+  int slack_ = 0;       // of timers
 };
 
 /// - Loads components on a thread like main()'s. Threads that a node starts in its constructor are then as in rclcpp's
