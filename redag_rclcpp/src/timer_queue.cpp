@@ -10,7 +10,7 @@
 namespace redag_rclcpp {
 namespace {
 
-bool is_same(Time a, Time b) { return std::max(a, b) < redag::saturated_add(std::min(a, b), kSame); }
+bool is_same(Time a, Time b) { return std::max(a, b) < redag::saturated_add(std::min(a, b), TimerQueue::kSame); }
 
 }  // namespace
 
