@@ -199,6 +199,8 @@ class Engine {
   /// here on.
   void remove_task(TaskId task);
   void set_timing(TaskId task, Duration period, Duration deadline);
+  /// When set_timing() was last called.
+  [[nodiscard]] std::optional<Time> settled() const;
 
   /// Once it has returned, the scheduler starts no job until resume(). Started jobs continue; a job that a thread was
   /// just given counts as started. Releases are accepted and kept.
@@ -367,6 +369,7 @@ class Engine {
   std::uint32_t pause_waiters_ REDAG_GUARDED_BY(lock_) = 0;
   FutexWord pause_changes_{0};  // counts what wait_paused() and wait_quiet() wait for; written under the lock
   Time halted_at_ REDAG_GUARDED_BY(lock_) = kNever;
+  std::optional<Time> settled_ REDAG_GUARDED_BY(lock_);
   trace::Ring decisions_;  // written under the lock
   EventMerge merge_;       // drain() only
   Event idle_event_;

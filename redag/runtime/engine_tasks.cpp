@@ -92,8 +92,14 @@ void Engine::set_timing(TaskId task, Duration period, Duration deadline) {
   scheduler_->set_timing(task, period, deadline, at);
   tasks_[task].period = period;
   tasks_[task].deadline = deadline;
+  settled_ = at;
   tasks_changed();
   decide(locked, at);
+}
+
+std::optional<Time> Engine::settled() const {
+  const LockGuard guard(lock_);
+  return settled_;
 }
 
 void Engine::register_dag(DagId id, const Dag &dag, std::span<const TaskId> ids, std::span<Body> bodies) {

@@ -48,6 +48,14 @@ void state_waits(Task &task, std::uint32_t most, Duration longest) {
   }
 }
 
+std::size_t count_rates(const Workload &workload) {
+  std::set<std::pair<Duration, Duration>> rates;
+  for (const Dag &dag : workload.dags) {
+    for (const Task &task : dag.tasks) rates.emplace(task.period, task.deadline);
+  }
+  return rates.size();
+}
+
 }  // namespace
 
 DagId Executor::Impl::add(Dag dag, std::vector<TaskBody> task_bodies, Sources sources) {
@@ -158,6 +166,7 @@ void Executor::Impl::remove(DagId dag) {
     if (found == dags_.end() || found->second.removed) return;
     Added &gone = found->second;
     gone.removed = true;
+    gone.removed_at = engine_->now();
     timer_->remove(gone.ids.tasks);
     for (const auto &source : gone.sources) {
       if (source != nullptr) source->disconnect();
@@ -260,9 +269,14 @@ trace::RunInfo Executor::Impl::run_info() const {
       state_wcet(task, figures.usage.longest);
       state_waits(task, figures.most_waits, figures.longest_waits);
       if (added.sources[i] != nullptr) info.event_tasks.emplace_back(position);
+      if (added.removed) info.removals.push_back({TaskId(position), added.removed_at});
       if (task.activation == Activation::Timer && task.phase == Phase::Common) task.offset += added.base;
     }
     info.workload.dags.push_back(std::move(dag));
+  }
+  // Where rates share levels, another task can move them all.
+  if (info.config.levels > 0 && count_rates(info.workload) > info.config.levels) {
+    for (const auto &[id, added] : dags_) info.settled = std::max(info.settled.value_or(0), added.base);
   }
   return info;
 }

@@ -68,6 +68,7 @@ class Executor::Impl {
     Time base = 0;         // where its release grid begins
     std::size_t left = 0;  // how many of the tasks' ids no later task has
     bool removed = false;
+    Time removed_at = 0;
   };
   struct Owner {
     DagId dag;  // the executor's id, not the engine's

@@ -16,7 +16,6 @@
 
 #include "redag/base/provenance.hpp"
 #include "redag/runtime/clock.hpp"
-#include "redag/runtime/system_clock.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/output_file.hpp"
 
@@ -68,15 +67,14 @@ void Recorder::end_thread() {
 Result<void> Recorder::describe_again() {
   trace::RunInfo info = describe_();
   info.machine = trace::this_machine();
-  // Threads are started first: before the run has begun, its time is no clock.
-  if (engine_->has_origin()) info.clock = read_system_clock([this] { return engine_->now(); });
   info.provenance = current_provenance();
   described_at_ = monotonic_now();
-  const bool states_clock = info.clock.has_value();
   if (info.workload.dags.empty()) return {};
-  if (flight_ && info.workload == described_ && states_clock == states_clock_) return {};
+  const bool is_known = info.workload == described_ && info.removals == removals_ && info.settled == settled_;
+  if (flight_ && is_known) return {};
   described_ = info.workload;
-  states_clock_ = states_clock;
+  removals_ = info.removals;
+  settled_ = info.settled;
   if (flight_) return flight_->describe(info);
   const trace::FlightOptions options{.most_bytes = most_bytes_};
   Result<trace::FlightRecorder> created = trace::FlightRecorder::create(flight(), info, options);
@@ -95,9 +93,8 @@ void Recorder::collect(Time end) {
   const std::size_t tasks = described_.task_count();
   const bool has_new_task =
       std::any_of(events_.begin(), events_.end(), [&](const JobEvent &e) { return e.task.value >= tasks; });
-  const bool lacks_clock = !states_clock_ && engine_->has_origin();
   const bool is_old = monotonic_now() - described_at_ >= kDescribeEvery;
-  if (has_new_task || lacks_clock || is_old || end != kNever) state_ = describe_again();
+  if (has_new_task || is_old || end != kNever) state_ = describe_again();
   if (state_ && flight_) state_ = flight_->append(events_, engine_->lost_events());
   if (state_ || end != kNever) return;
   std::fprintf(stderr, "%s: the record of the run ends here: %s\n", name_.c_str(), to_string(state_.error()).c_str());

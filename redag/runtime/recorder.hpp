@@ -62,7 +62,8 @@ class Recorder {
   std::string name_;
   std::optional<trace::FlightRecorder> flight_;  // from the first task on
   Workload described_;
-  bool states_clock_ = false;  // what was described does
+  std::vector<trace::Removal> removals_;  // described
+  std::optional<Time> settled_;           // described
   Time described_at_ = 0;
   std::vector<JobEvent> events_;
   Result<void> state_;  // the first error

@@ -37,7 +37,6 @@ Trace example() {
   trace.info.end = trace.info.start + kSecond;
   trace.info.warm_up = 5;
   trace.info.overheads = "dispatch 3us";
-  trace.info.clock = ClockReading{.at = -5, .system = 1'769'860'800'000'000'000, .error = 130};
   trace.info.machine = Machine{8, "Linux 6.1", "a processor"};
   trace.info.provenance = {"2026-01-31T12:00:00Z", "0.1.0", "0123abc", "robot", "Linux 6.1", "redag run 'a b'", "none"};
   Rng rng(1);
@@ -226,6 +225,20 @@ TEST_F(EventsFile, RemarksAreKept) {
   trace.info.remarks = {{.begun = 5, .ended = 9, .text = "deadlock: a"}, {.begun = 7, .text = "deadlock: b"}};
   written(trace);
   EXPECT_EQ(read_trace(path_).value().info.remarks, trace.info.remarks);
+}
+
+TEST_F(EventsFile, WhatChangedInTheRunIsKept) {
+  Trace trace = example();
+  trace.info.removals = {{TaskId(0), 70}};
+  trace.info.settled = 80;
+  written(trace);
+  const RunInfo read = read_trace(path_).value().info;
+  EXPECT_EQ(read.removals, trace.info.removals);
+  EXPECT_EQ(read.settled, trace.info.settled);
+  std::string bad = run_info_to_json(trace.info);
+  const std::string task = "\"task\":0";
+  bad.replace(bad.find(task), task.size(), "\"task\":99");
+  EXPECT_THAT(to_string(run_info_from_json(bad, "x", 1).error()), HasSubstr("positions of tasks"));
 }
 
 TEST_F(EventsFile, MistakesInRemarksAreSaid) {

@@ -102,14 +102,6 @@ Machine machine_from(const Json &json) {
   return machine;
 }
 
-std::optional<ClockReading> clock_from(const Json &json) {
-  const auto found = json.find("clock");
-  if (found == json.end()) return std::nullopt;
-  return ClockReading{.at = integer_of(*found, "at_ns", -kMaxTraceTime, kMaxTraceTime),
-                      .system = integer_of(*found, "system_ns", 0, kMaxTraceTime),
-                      .error = integer_of(*found, "error_ns", 0, kMaxTraceTime)};
-}
-
 // Files of runs without remarks, and those from before remarks existed, do not have the key.
 std::vector<Remark> remarks_from(const Json &json) {
   std::vector<Remark> remarks;
@@ -143,6 +135,19 @@ std::vector<TaskId> event_tasks_from(const Json &json, std::size_t task_count) {
   return tasks;
 }
 
+std::vector<Removal> removals_from(const Json &json, std::size_t task_count) {
+  std::vector<Removal> removals;
+  const auto rows = json.find("removals");
+  if (rows == json.end()) return removals;
+  if (!rows->is_array()) throw BadValue("'removals' must be a list");
+  for (const Json &row : *rows) {
+    const std::uint64_t task = unsigned_of(row, "task");
+    if (task >= task_count) throw BadValue("'removals' must name positions of tasks in the workload");
+    removals.push_back({TaskId(task), integer_of(row, "at_ns", -kMaxTraceTime, kMaxTraceTime)});
+  }
+  return removals;
+}
+
 // Files of earlier versions state events by `event_tasks` alone, as timers.
 void mark_events(RunInfo &info) {
   std::vector<Task *> tasks;
@@ -173,8 +178,8 @@ RunInfo info_from(const Json &json) {
   info.lost_events = unsigned_of(json, "lost_events");
   info.overheads = text_of(json, "overheads");
   info.machine = machine_from(member(json, "machine"));
-  info.clock = clock_from(json);
   info.remarks = remarks_from(json);
+  if (json.contains("settled_ns")) info.settled = integer_of(json, "settled_ns", -kMaxTraceTime, kMaxTraceTime);
   return info;
 }
 
@@ -203,15 +208,16 @@ std::string run_info_to_json(const RunInfo &info) {
       {"machine", {{"cpus", info.machine.cpus}, {"kernel", info.machine.kernel}, {"model", info.machine.model}}},
       {"workload", to_yaml(info.workload)}};
   if (info.stepped) json["stepped"] = true;
-  if (info.clock) {
-    json["clock"] = {{"at_ns", info.clock->at}, {"system_ns", info.clock->system}, {"error_ns", info.clock->error}};
-  }
   for (const Remark &remark : info.remarks) {
     json["remarks"].push_back({{"begun_ns", remark.begun},
                                {"ended_ns", remark.ended == kNever ? Json() : Json(remark.ended)},
                                {"text", remark.text}});
   }
   for (const TaskId task : info.event_tasks) json["event_tasks"].push_back(task.value);
+  for (const Removal &removal : info.removals) {
+    json["removals"].push_back({{"task", removal.task.value}, {"at_ns", removal.at}});
+  }
+  if (info.settled) json["settled_ns"] = *info.settled;
   // Texts from outside may not be UTF-8; a replaced character is better than no file.
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
@@ -229,6 +235,7 @@ Result<RunInfo> run_info_from_json(std::string_view text, const std::string &fil
     if (!loaded) return tl::unexpected<Diagnostics>(std::move(loaded.error()));
     info.workload = std::move(loaded->workload);
     info.event_tasks = event_tasks_from(json, info.workload.task_count());
+    info.removals = removals_from(json, info.workload.task_count());
     mark_events(info);
     return info;
   } catch (const BadValue &error) {

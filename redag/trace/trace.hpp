@@ -36,15 +36,6 @@ struct Machine {
   friend bool operator==(const Machine &, const Machine &) = default;
 };
 
-/// The system's clock (CLOCK_REALTIME) at one instant of a run. By it, runs of several hosts have a common time.
-struct ClockReading {
-  Time at = 0;         // in the time of the trace
-  Time system = 0;     // the system's clock then, since 1970
-  Duration error = 0;  // `at` and `system` are at most this far apart
-
-  friend bool operator==(const ClockReading &, const ClockReading &) = default;
-};
-
 /// Times of a trace are at most this far from 0 (73 years). No difference of two times, or of a time and the latest
 /// deadline, overflows.
 inline constexpr Time kMaxTraceTime = kMaxDuration / 2;
@@ -56,6 +47,14 @@ struct Remark {
   std::string text;
 
   friend bool operator==(const Remark &, const Remark &) = default;
+};
+
+/// A task that was removed while the run went on.
+struct Removal {
+  TaskId task;
+  Time at = 0;  // from then on, nothing releases it
+
+  friend bool operator==(const Removal &, const Removal &) = default;
 };
 
 struct RunInfo {
@@ -75,8 +74,11 @@ struct RunInfo {
   Machine machine;
   Provenance provenance;  // of the program that ran it; unknown in files from before this block existed
   std::vector<Remark> remarks;
-  std::optional<ClockReading> clock;  // none in virtual time, and in files from before it was recorded
-  std::vector<TaskId> event_tasks;    // timer tasks that the program releases: no grid, at least a period apart
+  std::vector<TaskId> event_tasks;  // timer tasks that the program releases: no grid, at least a period apart
+  std::vector<Removal> removals;
+  // When rates, deadlines or levels last changed: `workload` says what held from then on. Earlier events are not held
+  // to rules that follow from these.
+  std::optional<Time> settled;
 };
 
 struct Trace {

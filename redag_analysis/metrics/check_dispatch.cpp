@@ -292,8 +292,11 @@ void DispatchRules::check_running() {
   const auto &eligible = replay.eligible();
   if (!eligible.empty() && !context_.info.stepped)
     judge(eligible.begin()->urgency, eligible.begin()->task, eligible.begin()->number);
-  const LiveJob *suspended = most_urgent_suspended();
-  if (suspended != nullptr) judge(urgency_of(*suspended), suspended->task, suspended->number);
+  // A preempted job inherits only from jobs that are looked at: those that could themselves preempt.
+  for (const Replay::JobRef &ref : replay.suspended()) {
+    const LiveJob *job = replay.find(ref.task, ref.number);
+    judge(urgency_of(*job, least->raised, true), ref.task, ref.number);
+  }
 }
 
 // Returns the urgency with what a started job inherits from those that wait for its group. In a stepped run those may
@@ -305,19 +308,6 @@ Urgency DispatchRules::urgency_of(const LiveJob &job) const {
 // The same at the time when a job of urgency `looked_at` is looked at, which has `started` or not.
 Urgency DispatchRules::urgency_of(const LiveJob &job, const Urgency &looked_at, bool started) const {
   return context_.info.stepped ? job.own : context_.replay.inherited(job, looked_at, started);
-}
-
-const LiveJob *DispatchRules::most_urgent_suspended() const {
-  const LiveJob *best = nullptr;
-  Urgency best_urgency;
-  for (const Replay::JobRef &ref : context_.replay.suspended()) {
-    const LiveJob *job = context_.replay.find(ref.task, ref.number);
-    const Urgency urgency = urgency_of(*job);
-    if (best != nullptr && best_urgency <= urgency) continue;
-    best = job;
-    best_urgency = urgency;
-  }
-  return best;
 }
 
 }  // namespace redag::metrics

@@ -55,7 +55,6 @@ class DispatchRules {
   void check_running();
   [[nodiscard]] Urgency urgency_of(const LiveJob &job) const;
   [[nodiscard]] Urgency urgency_of(const LiveJob &job, const Urgency &looked_at, bool started) const;
-  [[nodiscard]] const LiveJob *most_urgent_suspended() const;
   [[nodiscard]] std::string name(const Replay::JobRef &job) const { return context_.job_name(job.task, job.number); }
   [[nodiscard]] sched::Preemption mode() const { return context_.info.config.preemption; }
   [[nodiscard]] bool exact() const {

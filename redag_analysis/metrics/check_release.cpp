@@ -30,6 +30,11 @@ ReleaseRules::ReleaseRules(CheckContext &context) : context_(context) {
   const bool keeps_timers = kind != nullptr && kind->keeps_releases;
   tasks_.resize(workload.task_count());
   removed_.resize(workload.dags.size(), false);
+  removed_at_.resize(workload.dags.size(), kNever);
+  for (const trace::Removal &removal : context.info.removals) {
+    Time &at = removed_at_[context.replay.dag_of(removal.task).value];
+    at = std::min(at, removal.at);
+  }
   std::size_t first = 0;
   for (const Dag &dag : workload.dags) {
     for (std::size_t i = 0; i < dag.tasks.size(); ++i) {
@@ -192,7 +197,7 @@ bool ReleaseRules::is_let_through(const JobEvent &event) const {
 
 void ReleaseRules::exceeded(const JobEvent &event) {
   if (context_.replay.task(event.task).on_budget != OnBudget::SkipNext) return;
-  if (!removed_[context_.replay.dag_of(event.task).value]) tasks_[event.task.value].refusals.skips_next = true;
+  if (!is_removed(event.task)) tasks_[event.task.value].refusals.skips_next = true;
 }
 
 // Jobs of DAGs of lower criticality that have not started are to be skipped.
@@ -304,7 +309,7 @@ void ReleaseRules::end_of_instant() {
   expected_skips_.clear();
   for (const TaskId id : touched_) {
     tasks_[id.value].touched = false;
-    if (!removed_[context_.replay.dag_of(id).value]) check_nothing_is_owed(id);
+    if (!is_removed(id)) check_nothing_is_owed(id);
   }
   touched_.clear();
 }
@@ -330,7 +335,7 @@ void ReleaseRules::end_of_trace() {
   if (context_.info.driver != trace::Driver::Simulator) return;
   for (std::size_t t = 0; t < tasks_.size(); ++t) {
     const TaskId id(t);
-    if (!tasks_[t].timer || removed_[context_.replay.dag_of(id).value]) continue;
+    if (!tasks_[t].timer || is_removed(id)) continue;
     const Task &task = context_.replay.task(id);
     const std::uint32_t next = tasks_[t].next_number;
     const Int128 due = Int128{context_.info.start} + task.offset + Int128{next} * task.period;

@@ -83,7 +83,13 @@ class ReleaseRules {
   CheckContext &context_;
   std::vector<Edge> edges_;
   std::vector<TaskState> tasks_;
-  std::vector<bool> removed_;  // per DAG
+  [[nodiscard]] bool is_removed(TaskId task) const {
+    const std::size_t dag = context_.replay.dag_of(task).value;
+    return removed_[dag] || removed_at_[dag] <= context_.now();
+  }
+
+  std::vector<bool> removed_;     // per DAG: a job was skipped for that reason
+  std::vector<Time> removed_at_;  // per DAG, as the run says; kNever: it does not say
   std::vector<ExpectedSkip> expected_skips_;
   ExpectedSkip just_released_;  // by the last event; no task: the last event was no release
   std::vector<TaskId> touched_;

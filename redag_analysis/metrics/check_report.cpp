@@ -4,8 +4,15 @@
 #include "redag_analysis/metrics/check_report.hpp"
 
 #include <algorithm>
+#include <array>
 
 namespace redag::metrics {
+
+bool follows_from_rates(Rule rule) {
+  constexpr std::array kRules{Rule::Grid,     Rule::Admission, Rule::Deadline, Rule::Preemption,
+                              Rule::Priority, Rule::Deferral,  Rule::Start,    Rule::Device};
+  return std::find(kRules.begin(), kRules.end(), rule) != kRules.end();
+}
 
 const char *to_string(Rule rule) {
   switch (rule) {

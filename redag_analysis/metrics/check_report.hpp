@@ -42,6 +42,9 @@ inline constexpr std::size_t kRuleCount = 19;
 
 [[nodiscard]] const char *to_string(Rule rule);
 
+/// Returns true if another rate, deadline or level can make a lawful event a violation of the rule.
+[[nodiscard]] bool follows_from_rates(Rule rule);
+
 /// The rules that a trace is held to.
 class RuleSet {
  public:
@@ -75,6 +78,7 @@ struct CheckReport {
 
   std::vector<Violation> violations;
   std::uint64_t violation_count = 0;
+  std::uint64_t not_judged = 0;  // tests not made, because rates changed later; see trace::RunInfo::settled
   std::array<std::uint64_t, kRuleCount> violations_by_rule{};
   std::array<std::uint64_t, kRuleCount> checks_by_rule{};
 

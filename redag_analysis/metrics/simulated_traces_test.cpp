@@ -40,6 +40,18 @@ RC_GTEST_PROP(SimulatedTraces, KeepEveryRule, ()) {
   RC_ASSERT(report.ok());
 }
 
+// The holder of a group does not inherit from a job that two more urgent ones keep from both workers.
+TEST(SimulatedTraces, AHolderInheritsOnlyFromJobsThatAreLookedAt) {
+  Workload workload =
+      testing::make_workload({testing::make_dag("a", {{"hold", 39, 4, {}, "g"}}),
+                              testing::make_dag("b", {{"x", 30, 1}, {"y", 30, 1, {}, "g"}, {"z", 1, 1}})},
+                             2, PreemptionMode::Os);
+  workload.policy = PolicyKind::Edf;
+  workload.ties = Ties::Fixed;
+  const CheckReport report = check_trace(simulated(testing::run_info(workload, "redag", 0), 200 * kMillisecond));
+  EXPECT_TRUE(report.ok()) << report.to_string();
+}
+
 // Nothing may depend on where time 0 is: a run can begin before it.
 RC_GTEST_PROP(SimulatedTraces, KeepEveryRuleAtAnyTime, ()) {
   const auto seed = *rc::gen::arbitrary<std::uint64_t>();

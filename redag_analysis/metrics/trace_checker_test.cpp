@@ -58,6 +58,22 @@ TEST(CheckTrace, TasksWithoutAGridAreThoseOfTheirCluster) {
   expect_kept(trace, Rule::Grid);
 }
 
+// The less urgent job goes first. Until its rate was learned, it was the more urgent one.
+TEST(CheckTrace, OrderIsJudgedByTheRatesThatHeld) {
+  TraceBuilder t(two_tasks());
+  t.at(0).arrives("hi", 0).arrives("lo", 0).dispatched("lo", 0, 0, 20);
+  t.at(4).finished("lo", 0, 0).dispatched("hi", 0, 0, 10).at(5).finished("hi", 0, 0);
+  trace::Trace trace = t.until(10);
+  expect_broken(trace, Rule::Priority);
+  trace.info.settled = 0;
+  const CheckReport report = check_trace(trace);
+  EXPECT_TRUE(report.ok()) << report.to_string();
+  EXPECT_GT(report.not_judged, 0U);
+  EXPECT_GT(report.checks(Rule::Worker), 0U);
+  trace.info.settled = -1;
+  expect_broken(trace, Rule::Priority);
+}
+
 TEST(CheckTrace, NamesTheJobTheTimeAndTheRule) {
   trace::Trace trace = two_tasks_run().until(10);
   trace.events[5].value -= kMillisecond;  // finish of hi#0, as measured

@@ -19,7 +19,6 @@
 #include "redag/runtime/live_sample.hpp"
 #include "redag/runtime/release_timer.hpp"
 #include "redag/runtime/spins.hpp"
-#include "redag/runtime/system_clock.hpp"
 #include "redag/runtime/threads.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_lab/run/concurrency.hpp"
@@ -258,17 +257,7 @@ class Run {
     for (const auto &instance : instances_) {
       if (Result<void> started = start(*instance); !started) return started;
     }
-    state_clock();
     return {};
-  }
-
-  // The record of the run states the clock, too: a killed run can be merged with those of other hosts.
-  void state_clock() {
-    result_.trace.info.clock = runtime::read_system_clock([this] { return time_now(); });
-    if (!flight_) return;
-    const Result<void> kept = flight_->describe(result_.trace.info);
-    if (!kept)
-      result_.warnings.push_back(fmt::format("the flight record lacks the clock: {}", to_string(kept.error())));
   }
 
   Result<void> start(Instance &instance) {

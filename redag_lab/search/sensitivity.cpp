@@ -316,7 +316,12 @@ std::vector<Knob> knobs_of(const Workload &workload, const analysis::TaskSet &ta
     const bool is_there = knob.kind == Knob::Kind::Rates && knob.tasks.size() == all.size();
     if (!is_there) knobs.push_back(std::move(knob));
     if (dag.units.size() < 2) continue;
-    for (const std::uint32_t unit : dag.units) knobs.push_back(rate_of(tasks, task_set.units[unit].tasks));
+    for (const std::uint32_t unit : dag.units) {
+      const std::vector<std::uint32_t> &members = task_set.units[unit].tasks;
+      // Data tasks that join several rates have no rate of their own.
+      const auto is_timer = [&](std::uint32_t t) { return tasks[t].task->activation == Activation::Timer; };
+      if (std::any_of(members.begin(), members.end(), is_timer)) knobs.push_back(rate_of(tasks, members));
+    }
   }
   return knobs;
 }

@@ -162,6 +162,16 @@ TEST(Sensitivity, KnobsAreThoseOfTasksAndRates) {
   EXPECT_EQ(knobs_of(workload, *task_set), expected);
 }
 
+TEST(Sensitivity, ADataTaskThatJoinsTwoRatesHasNone) {
+  const Workload workload = testing::make_workload(
+      {testing::make_dag("d", {{"a", 10, 1}, {"b", 40, 1}, {"f", 0, 1, {0, 1}}})}, 1, PreemptionMode::Os);
+  const auto task_set = analysis::compile(workload, analysis::platform_of(workload));
+  ASSERT_TRUE(task_set);
+  const std::vector<Knob> knobs = knobs_of(workload, *task_set);
+  EXPECT_THAT(knobs, ::testing::Contains(Knob{Kind::Period, {1}}));
+  EXPECT_THAT(knobs, ::testing::Not(::testing::Contains(Knob{Kind::Period, {2}})));
+}
+
 TEST(Sensitivity, TheRatesOfTheOnlyDagAreAllRates) {
   Workload workload = independent({{1, 10}});
   workload.dags[0].tasks.push_back(workload.dags[0].tasks[0]);

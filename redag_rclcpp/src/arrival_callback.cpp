@@ -51,6 +51,7 @@ void ArrivalCallback::detach() {
 
 void ArrivalCallback::arrived(std::size_t count, Source source, int part, bool seen_only, bool leftover) {
   std::shared_ptr<ExecutorContext> to_wake;
+  std::shared_ptr<ExecutorContext> to_adopt;
   std::shared_ptr<ExecutorContext> to_tell;
   std::shared_ptr<ExecutorContext> to_pace;
   Time now = 0;
@@ -64,7 +65,7 @@ void ArrivalCallback::arrived(std::size_t count, Source source, int part, bool s
     if (takes_part_) to_tell = context();
     // Messages of this process arrive on the publishing thread, within the job that is the task's predecessor.
     const redag::runtime::RunningJob *publisher = engine().current_job();
-    if (context()->learning()) learn_from_arrival(now, count, source, publisher);
+    if (learn_from_arrival(now, count, source, publisher)) to_adopt = context();
     const bool from_outside = is_from_outside(publisher, leftover);
     const bool held = from_outside && paced_;
     if (held) {
@@ -113,6 +114,7 @@ void ArrivalCallback::arrived(std::size_t count, Source source, int part, bool s
   if (begins) engine().release(release, now);
   if (uses_engine) end_release();
   if (to_wake) to_wake->wake();
+  if (to_adopt) to_adopt->rate_seen();
   if (to_tell) to_tell->exchange_arrived();
   if (to_pace) to_pace->lockstep()->arrived();
 }
@@ -252,14 +254,27 @@ Time ArrivalCallback::origin_of(Time now, const redag::runtime::RunningJob *publ
   return origin;
 }
 
-void ArrivalCallback::learn_from_arrival(Time now, std::size_t count, Source source,
+// Returns true if the rate is now known better than it was: the third arrival tells it, twice as many tell it better.
+bool ArrivalCallback::learn_from_arrival(Time now, std::size_t count, Source source,
                                          const redag::runtime::RunningJob *publisher) {
+  const Duration learning_time = context()->learning_time();
+  if (learning_time == 0 || has_learned_) return false;
   if (arrivals_[0] + arrivals_[1] == 0) first_arrival_ = now;
   last_arrival_ = now;
   arrivals_[index_of(source)] += count;
   if (publisher != nullptr && std::find(publishers_.begin(), publishers_.end(), publisher->task) == publishers_.end()) {
     publishers_.push_back(publisher->task);
   }
+  has_learned_ = now - first_arrival_ >= learning_time;
+  const std::uint64_t arrivals = arrivals_[0] + arrivals_[1];
+  if (!has_learned_ && arrivals < tells_at_) return false;
+  tells_at_ = 2 * arrivals;
+  return true;
+}
+
+bool ArrivalCallback::has_learned() const {
+  const redag::LockGuard guard(lock_);
+  return has_learned_;
 }
 
 std::vector<TaskId> ArrivalCallback::publishers() const {

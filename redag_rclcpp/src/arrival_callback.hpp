@@ -30,6 +30,7 @@ class ArrivalCallback : public Callback, public Hooked {
   [[nodiscard]] bool has_rate() const override { return false; }
   [[nodiscard]] std::vector<TaskId> publishers() const override;
   [[nodiscard]] Duration mean_interval() const override;
+  [[nodiscard]] bool has_learned() const override;
   [[nodiscard]] std::vector<KeptInput> kept() const override;
   [[nodiscard]] std::shared_ptr<void> hold() override { return entity(); }
   void pace(bool paced, std::uint64_t arrived) override;
@@ -146,8 +147,8 @@ class ArrivalCallback : public Callback, public Hooked {
   };
   [[nodiscard]] Overwritten drop_oldest(Source source) REDAG_REQUIRES(lock_);
   [[nodiscard]] Time origin_of(Time now, const redag::runtime::RunningJob *publisher) REDAG_REQUIRES(lock_);
-  void learn_from_arrival(Time now, std::size_t count, Source source, const redag::runtime::RunningJob *publisher)
-      REDAG_REQUIRES(lock_);
+  [[nodiscard]] bool learn_from_arrival(Time now, std::size_t count, Source source,
+                                        const redag::runtime::RunningJob *publisher) REDAG_REQUIRES(lock_);
   [[nodiscard]] bool take_token(Token &token);
   /// False: there is none, or it waits for an instant.
   [[nodiscard]] bool has_token() const REDAG_REQUIRES(lock_) { return !tokens_.empty() && !tokens_.front().held; }
@@ -187,6 +188,8 @@ class ArrivalCallback : public Callback, public Hooked {
   std::atomic<std::uint64_t> taken_{0};  // attempts that found a message for the callback
   Time first_arrival_ REDAG_GUARDED_BY(lock_) = 0;
   Time last_arrival_ REDAG_GUARDED_BY(lock_) = 0;
+  std::uint64_t tells_at_ REDAG_GUARDED_BY(lock_) = 3;  // number of arrivals
+  bool has_learned_ REDAG_GUARDED_BY(lock_) = false;
   Time last_origin_ REDAG_GUARDED_BY(lock_) = 0;
 };
 

@@ -68,11 +68,14 @@ class Callback : public TimerQueue::Timer,
   [[nodiscard]] virtual bool alive() const = 0;
   /// True if the entity itself states the rate of its releases.
   [[nodiscard]] virtual bool has_rate() const = 0;
+  /// The period that it states now; 0: none.
+  [[nodiscard]] virtual Duration stated_period() const { return 0; }
 
   /// Learned values. publishers(): the tasks whose jobs published the messages that arrived here. mean_interval(): the
-  /// mean time between arrivals that are handled; 0: fewer than three arrivals.
+  /// mean time between arrivals that are handled; 0: fewer than three arrivals. has_learned(): they no longer change.
   [[nodiscard]] virtual std::vector<TaskId> publishers() const = 0;
   [[nodiscard]] virtual Duration mean_interval() const = 0;
+  [[nodiscard]] virtual bool has_learned() const { return true; }
 
   /// For clients and servers of services and actions: which one, and the inputs that have arrived and were not taken,
   /// the oldest first.

@@ -21,7 +21,6 @@
 #include "redag/runtime/executor_options.hpp"
 #include "redag/runtime/live_sample.hpp"
 #include "redag/runtime/spins.hpp"
-#include "redag/runtime/system_clock.hpp"
 #include "redag/runtime/threads.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 
@@ -230,6 +229,11 @@ void ReDAGExecutor::Core::wait_set_changed() {
   if (waiting_ || direct_) bridge_.wake();
 }
 
+void ReDAGExecutor::Core::rate_seen() {
+  if (rate_seen_.exchange(true)) return;
+  keeper_parker_.unpark();
+}
+
 void ReDAGExecutor::Core::entities_changed() {
   if (registry_.set_stale()) return;
   keeper_parker_.unpark();
@@ -248,6 +252,7 @@ void ReDAGExecutor::Core::admit_noted() {
 // For the spin functions that pull: makes ready jobs of everything that there is to do now.
 void ReDAGExecutor::Core::admit(bool look_around) {
   begin_learning();
+  adopt_rates();
   if (learning_ && engine_->now() >= learn_until_) stop_learning();
   if (registry_.is_stale()) registry_.collect();
   if (look_around && !bridge_.empty()) bridge_.wait(nanoseconds(0));
@@ -388,6 +393,7 @@ void ReDAGExecutor::Core::keep_house(RaisedMiddleware *middleware) {
     if (middleware != nullptr && is_stale && look_at_middleware_at_ == kNever) {
       look_at_middleware_at_ = now + kThreadsAppear;
     }
+    adopt_rates();
     if (learning_ && now >= learn_until_) stop_learning();
     if (now >= report_unmatched_at_) report_unmatched();
     if (looks_for_deadlocks_ && look_for_deadlocks_at_ == kNever) {
@@ -525,14 +531,19 @@ void ReDAGExecutor::Core::on_exception(const redag::runtime::Job &job, std::exce
 
 void ReDAGExecutor::Core::begin_learning() {
   if (options_.learn.count() <= 0 || learn_until_ != kNever) return;
-  learn_until_ = engine_->now() + options_.learn.count();
+  learn_until_ = saturated_add(engine_->now(), options_.learn.count());
+  learns_ = true;
   learning_ = true;
 }
 
 void ReDAGExecutor::Core::stop_learning() {
   learning_ = false;
-  RCLCPP_INFO(logger(), "learned the rates of %zu callbacks; they no longer change", registry_.adopt_rates());
+  RCLCPP_INFO(logger(), "learned the rates of %zu callbacks", registry_.adopt_rates());
   learned_ = true;
+}
+
+void ReDAGExecutor::Core::adopt_rates() {
+  if (rate_seen_.exchange(false)) static_cast<void>(registry_.adopt_rates());
 }
 
 // ---- queries ----
@@ -567,7 +578,7 @@ redag::trace::RunInfo ReDAGExecutor::Core::run_info(std::vector<std::uint32_t> &
   info.driver = redag::trace::Driver::Ros;
   info.stepped = true;  // between spins no job starts, and some spin functions run one job at a time
   info.end = engine_->now();
-  info.clock = redag::runtime::read_system_clock([this] { return engine_->now(); });
+  info.settled = engine_->settled();
   info.lost_events = engine_->lost_events();
   info.machine = redag::trace::this_machine();
   info.provenance = redag::current_provenance();

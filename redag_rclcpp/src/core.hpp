@@ -84,7 +84,8 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
   void wait_set_changed() override;
   void exchange_arrived() override;
   void entities_changed() override;
-  [[nodiscard]] bool learning() const override { return learning_; }
+  [[nodiscard]] redag::Duration learning_time() const override { return learns_ ? options_.learn.count() : 0; }
+  void rate_seen() override;
   void let_wait() override;
   [[nodiscard]] std::shared_ptr<Callback> find_in_group(redag::TaskId member, const void *entity) const override {
     return tasks_.find_in_group(member, entity);
@@ -110,6 +111,7 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
   void on_exception(const redag::runtime::Job &job, std::exception_ptr exception);
   void begin_learning();
   void stop_learning();
+  void adopt_rates();
 
   rclcpp::Context::SharedPtr context_;
   const ReDAGOptions options_;
@@ -128,6 +130,8 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
   std::atomic<FirstSpin> first_spin_{FirstSpin::Awaited};
 
   std::atomic<bool> direct_{false};
+  std::atomic<bool> learns_{false};     // since the first spin
+  std::atomic<bool> rate_seen_{false};  // since the last adopt_rates()
   std::atomic<bool> learning_{false};
   std::atomic<bool> learned_{false};  // the window is over, and callbacks have their rates
   redag::Time learn_until_ = redag::kNever;

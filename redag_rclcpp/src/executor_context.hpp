@@ -36,7 +36,10 @@ class ExecutorContext {
   virtual void exchange_arrived() = 0;
   /// Called when a node or group may have other entities than before.
   virtual void entities_changed() = 0;
-  [[nodiscard]] virtual bool learning() const = 0;
+  /// For how long a callback learns, from its first arrival on; 0: it does not.
+  [[nodiscard]] virtual redag::Duration learning_time() const = 0;
+  /// Called when a callback knows its rate better than before. The caller holds no lock of this package.
+  virtual void rate_seen() = 0;
   /// Called before a job can wait. The first call creates the engine's threads for that. Throws std::runtime_error if
   /// the system refuses them.
   virtual void let_wait() = 0;

@@ -84,9 +84,11 @@ void Hook::set(const std::weak_ptr<Hooked> &hooked, Setter setter) {
 
 void Hook::clear() {
   if (!setter_) return;
-  // This fails if setting the hook had failed as well, or if the entity is being destroyed.
-  if (setter_(nullptr, nullptr) != RCL_RET_OK) rcl_reset_error();
-  Tickets::all().give_back(ticket_);
+  // Setting fails if it had failed before as well, or if the entity is being destroyed. A call with a ticket that was
+  // given back does nothing. To set it again waits for a call in progress.
+  if (stays_) Tickets::all().give_back(ticket_);
+  if (setter_(stays_ ? call : nullptr, stays_ ? ticket_ : nullptr) != RCL_RET_OK) rcl_reset_error();
+  if (!stays_) Tickets::all().give_back(ticket_);
   setter_ = nullptr;
 }
 

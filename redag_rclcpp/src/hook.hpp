@@ -32,7 +32,8 @@ class Hooked {
 
 class Hook {
  public:
-  Hook() = default;
+  /// `stays`: clear() leaves a hook that does nothing in the entity.
+  explicit Hook(bool stays = false) : stays_(stays) {}
   ~Hook() { clear(); }
   Hook(const Hook &) = delete;
   Hook &operator=(const Hook &) = delete;
@@ -57,6 +58,7 @@ class Hook {
 
   void set(const std::weak_ptr<Hooked> &hooked, Setter setter);
 
+  const bool stays_;
   Setter setter_;  // empty: no hook is set
   const void *ticket_ = nullptr;
 };

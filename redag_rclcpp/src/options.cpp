@@ -305,10 +305,10 @@ ReDAGOptions declare_options(rclcpp::Node &node) {
        "Period in seconds, for the priority of callbacks whose period neither `config` nor a timer states",
        "a number of seconds above 0"},
       0.1, false);
-  options.learn =
-      reader.seconds({"learn", "Seconds after the first spin in which rates and edges are learned; 0: no learning",
-                      "a number of seconds of at least 0"},
-                     10.0, true);
+  options.learn = reader.seconds(
+      {"learn", "Seconds from its first message in which the rate of a callback is learned, and edges; 0: no learning",
+       "a number of seconds of at least 0"},
+      10.0, true);
   options.raise_middleware = reader.flag(
       {"raise_middleware",
        "With preemption os, give the middleware's threads that deliver messages a higher priority than the workers",

@@ -325,9 +325,8 @@ std::vector<NodeBase::SharedPtr> Registry::nodes() const {
 
 std::size_t Registry::adopt_rates() {
   const redag::LockGuard guard(collect_lock_);
-  const auto learned = parts_.tasks.adopt_rates();
-  for (const auto &[task, period] : learned) parts_.engine.set_timing(task, period, period);
-  return learned.size();
+  for (const auto &[task, period] : parts_.tasks.adopt_rates()) parts_.engine.set_timing(task, period, period);
+  return parts_.tasks.count_learned();
 }
 
 std::vector<std::string> Registry::unmatched() const {

@@ -3,7 +3,9 @@
 
 // Services as callbacks: takes a request and calls the user's function. Each request is answered, also after a skip.
 #include <rcl/service.h>
+#include <rmw/rmw.h>
 
+#include <string_view>
 #include <utility>
 
 #include "arrival_callback.hpp"
@@ -14,6 +16,12 @@
 
 namespace redag_rclcpp {
 namespace {
+
+// rmw_fastrtps (8.4.1) calls the hook of a service without looking whether it has just been taken away. A wait set
+// still sees requests while there is a hook.
+bool is_called_without_a_look() {
+  return std::string_view(rmw_get_implementation_identifier()).starts_with("rmw_fastrtps");
+}
 
 class ServiceCallback final : public ArrivalCallback {
  public:
@@ -68,7 +76,7 @@ class ServiceCallback final : public ArrivalCallback {
   }
 
   const std::weak_ptr<rclcpp::ServiceBase> service_;
-  Hook hook_;
+  Hook hook_{is_called_without_a_look()};
 };
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <set>
 
 #include "redag/model/validate.hpp"
@@ -13,6 +14,15 @@
 #include "redag/runtime/stats.hpp"
 
 namespace redag_rclcpp {
+namespace {
+
+// More messages come than this process publishes: a program outside publishes to the topic, too, as to /tf.
+bool has_unseen_publisher(redag::Duration interval, double rate_seen) {
+  constexpr double kMore = 1.3;  // the first few messages tell a rate badly
+  return interval > 0 && static_cast<double>(interval) * rate_seen * kMore < 1;
+}
+
+}  // namespace
 
 using redag::Task;
 using redag::TaskId;
@@ -247,17 +257,23 @@ void TaskTable::sample(const redag::runtime::Engine &engine, const std::map<std:
 
 // ---- learned rates and edges ----
 
+// A period that is only a little better known is kept until the callback has learned: other tasks would change places.
 std::vector<std::pair<TaskId, redag::Duration>> TaskTable::adopt_rates() {
+  constexpr redag::Duration kBetter = 20;  // a change by one part of that many
   const redag::LockGuard guard(lock_);
   std::vector<std::pair<TaskId, redag::Duration>> changed;
   for (std::size_t i = 0; i < entries_.size(); ++i) {
     const Entry &entry = entries_[i];
-    if (!entry.callback || entry.configured || entry.callback->has_rate()) continue;
-    const redag::Duration period = seen_period(entry, 0);
-    if (period > 0 && period != entry.task.period) changed.emplace_back(TaskId(i), period);
+    if (!entry.callback || entry.configured) continue;
+    const bool is_final = entry.callback->has_rate() || entry.callback->has_learned();
+    const redag::Duration known = entry.task.period;
+    const redag::Duration period = std::min(seen_period(entry, 0), redag::kMaxDuration);
+    if (period <= 0 || period == known) continue;
+    if (is_final || std::abs(period - known) > known / kBetter) changed.emplace_back(TaskId(i), period);
   }
   for (const auto &[task, period] : changed) {
     Entry &entry = entries_[task.value];
+    entry.learned = !entry.callback->has_rate();
     entry.task.period = period;
     entry.task.deadline = period;
     entry.callback->set_deadline(period);
@@ -265,18 +281,32 @@ std::vector<std::pair<TaskId, redag::Duration>> TaskTable::adopt_rates() {
   return changed;
 }
 
-// The largest period of the tasks whose jobs publish to this task, as data tasks inherit it. Without such a task, the
-// mean time between arrivals; 0: unknown. `depth` ends cycles.
+std::size_t TaskTable::count_learned() const {
+  const redag::LockGuard guard(lock_);
+  return static_cast<std::size_t>(std::count_if(entries_.begin(), entries_.end(),
+                                                [](const Entry &entry) { return entry.callback && entry.learned; }));
+}
+
+// The largest period of the tasks whose jobs publish to this task, as data tasks inherit it. Without such a task, or if
+// others publish to it as well, the mean time between arrivals; 0: unknown. `depth` ends cycles.
 redag::Duration TaskTable::seen_period(const Entry &entry, int depth) const {
   constexpr int kDeepest = 32;
-  if (entry.configured || entry.callback->has_rate()) return entry.task.period;
+  if (entry.configured) return entry.task.period;
+  if (entry.callback->has_rate()) {
+    const redag::Duration stated = entry.callback->stated_period();
+    return stated > 0 ? stated : entry.task.period;
+  }
   if (is_ros_internal(entry.id)) return 0;  // nodes are loaded in bursts, which tell no rate
   redag::Duration period = 0;
+  double rate = 0;  // per nanosecond, of the publishers together
   for (const TaskId publisher : entry.callback->publishers()) {
     if (depth >= kDeepest || publisher.value >= entries_.size() || !entries_[publisher.value].callback) continue;
-    period = std::max(period, seen_period(entries_[publisher.value], depth + 1));
+    const redag::Duration its_period = seen_period(entries_[publisher.value], depth + 1);
+    if (its_period > 0) rate += 1 / static_cast<double>(its_period);
+    period = std::max(period, its_period);
   }
-  return period > 0 ? period : entry.callback->mean_interval();
+  const redag::Duration interval = entry.callback->mean_interval();
+  return period > 0 && !has_unseen_publisher(interval, rate) ? period : interval;
 }
 
 // With `live`, the present tasks, for a workload file. Otherwise all tasks that ever existed, each with a wcet, for a
@@ -342,6 +372,12 @@ void TaskTable::add_seen_edges(Workload &workload, const Ids &ids) const {
       }
       const auto publishers = entry.callback->publishers();
       if (entry.callback->has_rate() || publishers.size() != 1) continue;
+      const Entry &publisher = entries_[publishers.front().value];
+      const redag::Duration its_period = publisher.callback ? seen_period(publisher, 0) : 0;
+      if (its_period > 0 &&
+          has_unseen_publisher(entry.callback->mean_interval(), 1 / static_cast<double>(its_period))) {
+        continue;
+      }
       const auto position = std::find(ids[d].begin(), ids[d].end(), publishers.front().value);
       if (position == ids[d].end() || *position == ids[d][t]) continue;
       dag.tasks[t].predecessors = {static_cast<std::uint32_t>(position - ids[d].begin())};

@@ -37,6 +37,7 @@ class TaskTable {
     std::uint32_t rank = 0;         // topological rank within its DAG
     bool configured = false;        // named by the workload
     bool in_default_group = false;  // of its node
+    bool learned = false;           // its period is not the one it began with
   };
 
   /// `platform`, `policy` and `ties` are the executor's. `configured` is the user's workload, or null.
@@ -68,6 +69,8 @@ class TaskTable {
   /// Gives callbacks without a stated rate the rate that was learned. Returns the changed tasks and their new period,
   /// which is also their deadline.
   std::vector<std::pair<redag::TaskId, redag::Duration>> adopt_rates();
+  /// How many callbacks have a learned rate.
+  [[nodiscard]] std::size_t count_learned() const;
 
   /// The present tasks with learned edges (see ReDAGExecutor::learned).
   [[nodiscard]] redag::Workload learned() const;

@@ -21,6 +21,7 @@ namespace {
 
 constexpr Duration kClockReads = 10 * redag::kMicrosecond;  // clock readings further apart are repeated
 constexpr std::int64_t kMostMissed = 1000;                  // largest number of missed releases that are reported
+constexpr Duration kBetweenLooks = 100 * redag::kMillisecond;
 
 /// Readings of a timer's clock and the engine's clock, taken together.
 struct TimerReading {
@@ -55,6 +56,12 @@ bool is_simulated(const rcl_timer_t &timer) {
   return enabled;
 }
 
+bool is_steady(const rcl_timer_t &timer) {
+  rcl_clock_t *clock = nullptr;
+  if (rcl_timer_clock(const_cast<rcl_timer_t *>(&timer), &clock) != RCL_RET_OK) rcl_reset_error();
+  return clock != nullptr && clock->type == RCL_STEADY_TIME;
+}
+
 Duration period_of(const rcl_timer_t &timer) {
   Duration period = 0;
   if (rcl_timer_get_period(&timer, &period) != RCL_RET_OK) rcl_reset_error();
@@ -70,13 +77,16 @@ class TimerCallback final : public Callback {
         timer_(timer),
         owner_(owner),
         is_owned_(owner != nullptr),
-        handle_(timer->get_timer_handle()) {}
+        handle_(timer->get_timer_handle()),
+        can_be_set_(!is_steady(*handle_)),
+        known_period_(period_of(*handle_)) {}
 
   void detach() override;
   void admit() override {}
   void begin_instant(Time turn) override;
   [[nodiscard]] bool alive() const override { return !timer_.expired() && (!is_owned_ || !owner_.expired()); }
   [[nodiscard]] bool has_rate() const override { return true; }
+  [[nodiscard]] Duration stated_period() const override { return period_of(*handle_); }
   [[nodiscard]] std::shared_ptr<void> hold() override {
     return is_owned_ && owner_.expired() ? nullptr : timer_.lock();
   }
@@ -109,6 +119,11 @@ class TimerCallback final : public Callback {
   /// Computes when the timer is due. Called after a reset or a jump of its clock.
   void look();
   void reschedule();
+  void tell_period();
+  /// When to look at the timer again that is due then. A clock that can be set may be set meanwhile.
+  [[nodiscard]] Time next_look(Time now, Time due) const {
+    return can_be_set_ ? std::min(due, saturated_add(now, kBetweenLooks)) : due;
+  }
   void drop_expiry();
   [[nodiscard]] std::shared_ptr<TimerCallback> self() {
     return std::static_pointer_cast<TimerCallback>(shared_from_this());
@@ -118,10 +133,12 @@ class TimerCallback final : public Callback {
   const std::weak_ptr<rclcpp::Waitable> owner_;
   const bool is_owned_;
   const std::shared_ptr<const rcl_timer_t> handle_;  // the handle alone: the last owner of a timer cancels it
+  const bool can_be_set_;                            // its clock
   rclcpp::JumpHandler::SharedPtr clock_watch_;       // reports that simulated time begins or ends
   Time last_release_ = kNever;                       // guarded by the timer queue's lock
   std::atomic<bool> uncalled_{false};                // released, and not called since
   std::atomic<bool> restarted_{false};               // the timer's grid begins anew
+  std::atomic<Duration> known_period_;               // to the scheduler, or soon
 };
 
 bool TimerCallback::connect() {
@@ -179,9 +196,19 @@ void TimerCallback::look() {
   reschedule();
 }
 
+// The program has exchanged the period.
+void TimerCallback::tell_period() {
+  std::shared_ptr<ExecutorContext> executor;
+  {
+    const redag::LockGuard guard(lock_);
+    executor = context();
+  }
+  if (executor) executor->rate_seen();
+}
+
 void TimerCallback::reschedule() {
   const TimerReading reading = read_timer(*handle_, engine());
-  Time due = saturated_add(reading.now, reading.until);
+  Time due = next_look(reading.now, saturated_add(reading.now, reading.until));
   if (reading.cancelled || (reading.until > 0 && is_simulated(*handle_))) due = kNever;
   const redag::LockGuard guard(lock_);
   if (context() && context()->timers().schedule(*this, due)) context()->timers_changed();
@@ -193,7 +220,7 @@ Time TimerCallback::expire(Time now, std::vector<Release> &releases, std::vector
   if (follows && simulated) return kNever;  // see begin_instant()
   const TimerReading reading = read_timer(*handle_, engine());
   if (reading.cancelled) return kNever;
-  if (reading.until > 0) return simulated ? kNever : saturated_add(reading.now, reading.until);
+  if (reading.until > 0) return simulated ? kNever : next_look(now, saturated_add(reading.now, reading.until));
   if ((follows || (simulated && lockstep() != nullptr)) && !is_ros_internal(id())) lockstep()->came_from_outside(*this);
 
   const Duration period = period_of(*handle_);
@@ -218,7 +245,7 @@ Time TimerCallback::expire(Time now, std::vector<Release> &releases, std::vector
     uncalled_ = true;
     releases.push_back(Release{task(), nominal});
   }
-  return saturated_add(nominal, period);
+  return next_look(now, saturated_add(nominal, period));
 }
 
 // An instant calls each timer that is due once, also one with a period of 0.
@@ -256,7 +283,9 @@ bool TimerCallback::run() {
   TRACETOOLS_TRACEPOINT(rclcpp_executor_execute, static_cast<const void *>(handle_.get()));
   compat::TimerCall call(*timer);
   if (!call.valid()) return false;
-  const bool always_due = period_of(*handle_) == 0;
+  const Duration period = period_of(*handle_);
+  if (known_period_.exchange(period) != period) tell_period();
+  const bool always_due = period == 0;
   if (!always_due) reschedule();
   call.execute();
   if (always_due) reschedule();

@@ -159,7 +159,10 @@ std::string describe_check(const metrics::CheckReport &check, const StreamTraits
       std::accumulate(check.checks_by_rule.begin(), check.checks_by_rule.end(), std::uint64_t{0});
   const auto rules = std::count_if(check.checks_by_rule.begin(), check.checks_by_rule.end(),
                                    [](std::uint64_t count) { return count > 0; });
-  const std::string tested = fmt::format("{} checks of {} rules", format_count(checks), rules);
+  std::string tested = fmt::format("{} checks of {} rules", format_count(checks), rules);
+  if (check.not_judged > 0) {
+    tested += fmt::format("; {} not made, because the rates of tasks changed later", format_count(check.not_judged));
+  }
   if (check.ok()) return fmt::format("trace check: {}, {}\n", tinted("ok", Tint::Good, terminal.colour), tested);
   return fmt::format(
       "trace check: {}, {}\n{}",
@@ -224,8 +227,11 @@ Json to_json(const metrics::CheckReport &check) {
                               {"job", violation.job},
                               {"text", violation.text}});
   }
-  return Json{
-      {"ok", check.ok()}, {"violation_count", check.violation_count}, {"rules", rules}, {"violations", violations}};
+  return Json{{"ok", check.ok()},
+              {"violation_count", check.violation_count},
+              {"not_judged", check.not_judged},
+              {"rules", rules},
+              {"violations", violations}};
 }
 
 Json to_json(const lab::Session &session) {

@@ -59,7 +59,8 @@ struct ReDAGOptions {
   /// Period of a callback whose period neither the workload nor a timer states. It decides the callback's priority
   /// until a rate is learned. Must be above 0.
   std::chrono::nanoseconds default_period = std::chrono::milliseconds(100);
-  /// Time after the first spin in which rates and edges are learned. Afterwards they are frozen. 0: no learning.
+  /// Time in which the rate of a callback is learned, and who publishes to it, from its first message after the first
+  /// spin on. The third message already tells a rate; after this time it is frozen. 0: no learning.
   std::chrono::nanoseconds learn = std::chrono::nanoseconds(0);
 
   /// os: while spin() runs, raises the middleware's threads that deliver messages above the workers, where they are

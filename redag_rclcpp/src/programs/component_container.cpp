@@ -56,9 +56,12 @@ Parameters, with their defaults:
                          first) or fixed
   threads 0              with os: callbacks started and unfinished at once;
                          0: workers + 16
+  spare_threads 0        with none and cooperative: callbacks that can block at
+                         a time in a redag::Blocking without a worker
   cpu_affinity []        processors of the workers; empty: all
   default_period 0.1     period in seconds of callbacks without a known one
-  learn 10.0             seconds in which rates and edges are learned
+  learn 10.0             seconds from its first message in which the rate of a
+                         callback is learned, and edges
   raise_middleware true  with os: raise the middleware's threads above the
                          workers
   lock_memory false      lock memory and touch stacks, to avoid page faults
@@ -66,6 +69,8 @@ Parameters, with their defaults:
                          not with os
   watchdog 0.0           warn about callbacks in progress for longer than
                          these seconds; 0: no warnings
+  deadlocks true         name callbacks that wait for a response which cannot
+                         reach them
   live true              let 'redag top' show the executor (a page of memory
                          that only its owner can read)
   lockstep false         run callbacks in the same order in each replay of a
@@ -210,6 +215,15 @@ void apply(const Arguments &arguments, Manager &manager, redag_rclcpp::ReDAGOpti
   options.workers = 1;
 }
 
+/// Names parameters that no part of the container has, such as `-p wrkers:=2`.
+void warn_of_unknown_parameters(Manager &manager) {
+  for (const auto &[name, value] : manager.get_node_parameters_interface()->get_parameter_overrides()) {
+    if (manager.has_parameter(name)) continue;
+    RCLCPP_WARN(manager.get_logger(), "the parameter '%s' is not known and has no effect; --help lists the parameters",
+                name.c_str());
+  }
+}
+
 int run(const Arguments &arguments) {
   std::shared_ptr<Manager> manager;
   std::shared_ptr<redag_rclcpp::ReDAGExecutor> executor;
@@ -226,6 +240,7 @@ int run(const Arguments &arguments) {
     manager->set_executor(executor);
     executor->add_node(manager);
     monitor = std::make_unique<redag_rclcpp::Monitor>(manager, *executor, std::move(monitored));
+    warn_of_unknown_parameters(*manager);
   } catch (const std::exception &error) {
     RCLCPP_FATAL(logger, "%s", error.what());
     return kExitBadInput;
