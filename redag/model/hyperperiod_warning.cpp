@@ -40,15 +40,12 @@ std::optional<Duration> least_common_multiple(const std::vector<Duration> &perio
   return static_cast<Duration>(result);
 }
 
-std::string long_time(std::optional<Duration> time) {
-  if (!time) return "longer than 146 years";
-  const double hours = static_cast<double>(*time) / (3600.0 * kSecond);
-  if (hours < 48) return fmt::format("{:.1f} hours", hours);
-  const double days = hours / 24;
-  return days < 730 ? fmt::format("{:.0f} days", days) : fmt::format("{:.0f} years", days / 365.25);
-}
-
 }  // namespace
+
+std::string hyperperiod_text(std::optional<Duration> hyperperiod) {
+  if (!hyperperiod) return "longer than 146 years";
+  return *hyperperiod < 3600 * kSecond ? format_duration(*hyperperiod) : humanize_duration(*hyperperiod);
+}
 
 std::optional<Duration> rounded_rate(Duration period) {
   constexpr Duration kMost = 1000;
@@ -108,7 +105,7 @@ std::optional<Finding> hyperperiod_warning(const Workload &workload,
                   others == 0   ? std::string(" makes")
                   : others == 1 ? std::string(" and 1 other make")
                                 : fmt::format(" and {} others make", others),
-                  long_time(now));
+                  hyperperiod_text(now));
   finding.hint = std::move(hint);
   return finding;
 }

@@ -26,7 +26,7 @@ std::string warnings(std::initializer_list<const char *> periods) {
 TEST(HyperperiodWarning, AnOddPeriodGetsRoundNeighbours) {
   EXPECT_EQ(
       warnings({"period: 10ms", "period: 33.333333ms", "period: 100ms"}),
-      "w.yaml:5:37: warning: period 33.333333ms makes the hyperperiod 39 days, too long for a simulation to cover "
+      "w.yaml:5:37: warning: period 33.333333ms makes the hyperperiod 38d 14h, too long for a simulation to cover "
       "(33ms makes it 3.3s, 34ms makes it 1.7s; 'rate: 30Hz' says that it is meant)");
 }
 

@@ -476,7 +476,7 @@ TEST(RobotUnionBounds, HoldForDataOfOtherProcesses) {
   }
   RecordProperty("robots", static_cast<int>(robots));
   RecordProperty("crossed", static_cast<int>(crossed));
-  EXPECT_GT(robots, count / 20);
+  EXPECT_GT(robots, count / 40);
   EXPECT_GT(crossed, robots * 20);
 }
 

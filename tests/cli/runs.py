@@ -219,7 +219,9 @@ class Waits(Case):
         fifo = self.write("fifo.yaml", one.read_text().replace("queue: priority", "queue: fifo"))
         self.expect(redag("analyze", fifo, "--check", *oblivious), 1)
         late = self.write("late.yaml", fifo.read_text().replace("deadline: 50ms", "deadline: 30ms"))
-        self.assertIn("queue: priority", self.expect(redag("analyze", late, "--explain", "camera.detect"), 0).stdout)
+        explained = self.expect(redag("analyze", late, "--explain", "camera.detect"), 0).stdout
+        self.assertIn("what to change for the end-to-end deadline of camera, 30ms: ", explained)
+        self.assertIn("queue: priority", explained)
 
     def test_bounded_on_several_workers(self):
         self.expect(redag("analyze", self.FILE, "--check"), 0)

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "redag/base/rounded_time.hpp"
 #include "redag/base/text.hpp"
@@ -104,6 +105,18 @@ double share(Duration part, Duration whole) {
   return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0;
 }
 
+// The row of the task's DAG, if that may miss its end-to-end deadline.
+std::optional<lab::Row> dag_that_may_miss(const lab::Analysed &analysed, const lab::Row &row) {
+  if (!row.task.valid()) return std::nullopt;
+  const auto &dags = analysed.task_set.dags;
+  const auto dag = std::find_if(dags.begin(), dags.end(), [&](const analysis::CompiledDag &candidate) {
+    return std::find(candidate.tasks.begin(), candidate.tasks.end(), row.task.value) != candidate.tasks.end();
+  });
+  if (dag == dags.end()) return std::nullopt;
+  const lab::Row its_row = lab::dag_rows(analysed)[static_cast<std::size_t>(dag - dags.begin())];
+  return its_row.standing == lab::Standing::MayMiss ? std::optional(its_row) : std::nullopt;
+}
+
 std::string explain_bound(const lab::Analysed &analysed, const lab::Row &row, const StreamTraits &terminal) {
   const Duration response = *row.tightest.response;
   std::vector<Term> terms = lab::terms_of(analysed, row);
@@ -124,8 +137,13 @@ std::string explain_bound(const lab::Analysed &analysed, const lab::Row &row, co
   const std::string largest =
       fmt::format("the largest contribution is {} of {} ({})", humanize_duration(terms.front().amount),
                   humanize_duration(response), format_percent(share(terms.front().amount, response)));
-  if (row.standing != lab::Standing::MayMiss) return text + largest + "; nothing needs to change\n";
-  text += fmt::format("what to change: {}: {}\n", largest, advice(analysed, terms.front()));
+  const std::optional<lab::Row> late_dag = dag_that_may_miss(analysed, row);
+  if (row.standing != lab::Standing::MayMiss && !late_dag) return text + largest + "; nothing needs to change\n";
+  const std::string deadline = row.standing == lab::Standing::MayMiss
+                                   ? ""
+                                   : fmt::format(" for the end-to-end deadline of {}, {}", late_dag->name,
+                                                 humanize_duration(late_dag->deadline));
+  text += fmt::format("what to change{}: {}: {}\n", deadline, largest, advice(analysed, terms.front()));
   if (row.slack.value_or(0) < 0)
     text += fmt::format("the bound exceeds the deadline by {}\n", humanize_duration(-*row.slack));
   return text;

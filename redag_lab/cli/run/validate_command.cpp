@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "redag/base/words.hpp"
+#include "redag/model/hyperperiod_warning.hpp"
 #include "redag_analysis/sim/simulator.hpp"
 #include "redag_analysis/text/tint.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
@@ -52,7 +53,7 @@ std::string describe(const Facts &facts) {
   return fmt::format("{}, {}{}, {}, utilization {:.3f} on {} ({:.1f} %), hyperperiod {}", plural(facts.dags, "DAG"),
                      plural(facts.tasks, "task"), unknown, plural(facts.edges, "edge"), facts.utilization,
                      plural(facts.workers, "worker"), 100 * facts.utilization / facts.workers,
-                     facts.hyperperiod ? format_duration(*facts.hyperperiod) : "longer than 146 years");
+                     hyperperiod_text(facts.hyperperiod));
 }
 
 Json facts_json(const std::string &name, const Facts &facts) {

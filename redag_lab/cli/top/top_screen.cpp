@@ -7,6 +7,8 @@
 
 #include <algorithm>
 #include <array>
+#include <string_view>
+#include <utility>
 
 #include "redag/base/text.hpp"
 #include "redag/base/words.hpp"
@@ -22,6 +24,16 @@ using live::Frame;
 
 constexpr std::size_t kLeastBar = 36;  // columns of a thread, with the name of its task
 constexpr std::size_t kMarginOfList = 4;
+
+Line fitted(Line line, std::size_t width, const Glyphs &glyphs) {
+  constexpr std::string_view kDots = "\u2026";
+  line = cut(std::move(line), width);
+  for (Span &span : line) {
+    const std::size_t at = glyphs.ascii ? span.text.find(kDots) : std::string::npos;
+    if (at != std::string::npos) span.text.replace(at, kDots.size(), "~");
+  }
+  return line;
+}
 
 // Each line fits into 80 columns.
 constexpr std::array kHelp{
@@ -166,7 +178,7 @@ class Drawing {
     } else {
       frame();
     }
-    for (Line &line : drawing_.lines) line = cut(std::move(line), columns_);
+    for (Line &line : drawing_.lines) line = fitted(std::move(line), columns_, glyphs_);
     return std::move(drawing_);
   }
 
@@ -318,7 +330,7 @@ std::vector<Line> draw_once(const live::Listed &listed, const LiveView &view, Ti
     lines.push_back(words(fmt::format("(no room for: {})", fmt::join(table.hidden, ", ")), Tint::Faint));
   }
   if (width > 0) {
-    for (Line &line : lines) line = cut(std::move(line), width);
+    for (Line &line : lines) line = fitted(std::move(line), width, glyphs);
   }
   return lines;
 }

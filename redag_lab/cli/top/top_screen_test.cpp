@@ -286,6 +286,17 @@ TEST(TopScreen, OfManyThreadsTheBusiestAreShown) {
   EXPECT_THAT(text, Not(HasSubstr("\n12 [")));
 }
 
+TEST(TopOnce, WhatIsCutIsMarkedInAscii) {
+  const live::Listed robot = robot_page();
+  bool is_cut = false;
+  for (const Line &line : draw_once(robot, {}, robot.page->frame.published, 30, kAscii)) {
+    const std::string text = plain(line);
+    is_cut = is_cut || text.ends_with("~");
+    for (const char c : text) EXPECT_LT(static_cast<unsigned char>(c), 0x80) << text;
+  }
+  EXPECT_TRUE(is_cut);
+}
+
 TEST(TopOnce, AllRowsAndColumnsWithoutALimit) {
   const live::Listed robot = robot_page();
   std::vector<std::string> lines;
