@@ -41,7 +41,9 @@ class SizeClass {
   LeftOver *first_ REDAG_GUARDED_BY(lock_) = nullptr;
 };
 
-std::size_t class_of(std::size_t size) { return std::bit_width((std::max(size, kLeastSize) - 1) / kLeastSize); }
+std::size_t class_of(std::size_t size) {
+  return static_cast<std::size_t>(std::bit_width((std::max(size, kLeastSize) - 1) / kLeastSize));
+}
 
 // Never destroyed: an executor with static storage gives frames back when the process ends.
 SizeClass &size_class(std::size_t number) {
