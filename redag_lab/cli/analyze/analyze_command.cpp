@@ -284,6 +284,8 @@ Action add_analyze(CLI::App &app) {
              format_count(kUsualStates) + "); gives best and worst responses, exact on one worker")
       ->type_name("[=STATES]")
       ->disable_flag_override(false)
+      ->default_str("")  // CLI11 2.4 would otherwise read a "0" where the flag is absent
+      ->force_callback(false)
       ->check(is_states);
   add_count(app, "--effort", options->analysis.effort, {0, kMostEffort},
             "Steps after which one method gives up, in millions; 0: no limit. The result is the same on every machine")
