@@ -3,8 +3,6 @@
 
 #include "redag/runtime/device_threads.hpp"
 
-#include <pthread.h>
-
 #include <algorithm>
 #include <utility>
 
@@ -98,13 +96,13 @@ void DeviceThreads::main(DeviceThread &self, int priority, const Served &served)
       continue;
     }
     const bool is_raised = priority > 0;
-    if (is_raised) static_cast<void>(set_fifo_priority(::pthread_self(), self.priority));
+    if (is_raised) static_cast<void>(set_fifo_priority(self.handle.native_handle(), self.priority));
     try {
       wait->function(wait->argument);
     } catch (...) {
       wait->exception = std::current_exception();
     }
-    if (is_raised) static_cast<void>(set_fifo_priority(::pthread_self(), priority));
+    if (is_raised) static_cast<void>(set_fifo_priority(self.handle.native_handle(), priority));
     served(self, wait->job);
   }
 }

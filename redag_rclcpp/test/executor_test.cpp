@@ -486,6 +486,37 @@ TEST_P(ExecutorTest, LearnsRatesAndEdges) {
   EXPECT_THAT(again.warnings(), ::testing::Not(::testing::Contains(HasSubstr("no callback matches"))));
 }
 
+// A node that is loaded later has its rates at once as well, and a timer the period that the program gives it.
+TEST_P(ExecutorTest, LearnsFromTheThirdMessageOnWheneverItComes) {
+  options.learn = 1h;
+  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  auto timer = node->create_wall_timer(
+      200ms, [] {}, new_group());
+  executor.add_node(node);
+  const Spinner spinner(executor);
+  const auto period_of = [&](const std::string &name, redag::Callback::Kind kind) {
+    for (const CallbackStats &stats : executor.stats()) {
+      if (stats.id.kind == kind && stats.id.name.find(name) != std::string::npos) return stats.period;
+    }
+    return redag::Duration{0};
+  };
+  auto out = publisher("/late");
+  auto subscription = subscribe("/late", [] {});
+  ASSERT_TRUE(eventually([&] { return out->get_subscription_count() == 1; }));
+  const auto is_learned = [&] {
+    const redag::Duration period = period_of("/late", redag::Callback::Kind::Subscription);
+    return period > 0 && period != options.default_period.count();
+  };
+  EXPECT_TRUE(eventually(is_learned, [&] {
+    out->publish(Empty());
+    std::this_thread::sleep_for(5ms);
+  }));
+  EXPECT_FALSE(executor.learning_done());
+  std::int64_t before = 0;
+  ASSERT_EQ(rcl_timer_exchange_period(timer->get_timer_handle().get(), 10'000'000, &before), RCL_RET_OK);
+  EXPECT_TRUE(eventually([&] { return period_of("", redag::Callback::Kind::Timer) == 10'000'000; }));
+}
+
 // If another process subscribes as well (a recorder, rviz), the middleware brings every message a second time. rclcpp
 // ignores the copy, and learning must not count it.
 TEST_P(ExecutorTest, LearnsARateOnceWhereOthersSubscribeToo) {
