@@ -33,7 +33,9 @@ void DispatchRules::before(const JobEvent &event) {
 }
 
 void DispatchRules::dispatched(const JobEvent &event, const LiveJob &job) {
-  context_.expect(Rule::Deadline, event.value == job.deadline, event.task, event.job, [&] {
+  // A job keeps the deadline that its task had when it was released.
+  const bool had_another = context_.info.settled && job.release <= *context_.info.settled;
+  context_.expect(Rule::Deadline, event.value == job.deadline || had_another, event.task, event.job, [&] {
     return "its deadline is " + format_duration(event.value) + ", but r + D is " + format_duration(job.deadline);
   });
   check_bounds(event);

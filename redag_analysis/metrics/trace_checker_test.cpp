@@ -74,6 +74,16 @@ TEST(CheckTrace, OrderIsJudgedByTheRatesThatHeld) {
   expect_broken(trace, Rule::Priority);
 }
 
+TEST(CheckTrace, AJobKeepsTheDeadlineOfItsRelease) {
+  TraceBuilder t(two_tasks());
+  t.at(0).arrives("hi", 0).arrives("lo", 0).dispatched("hi", 0, 0, 10);
+  t.at(1).finished("hi", 0, 0).dispatched("lo", 0, 0, 19).at(5).finished("lo", 0, 0);
+  trace::Trace trace = t.until(10);
+  expect_broken(trace, Rule::Deadline);
+  trace.info.settled = 0;
+  expect_kept(trace, Rule::Deadline);
+}
+
 TEST(CheckTrace, NamesTheJobTheTimeAndTheRule) {
   trace::Trace trace = two_tasks_run().until(10);
   trace.events[5].value -= kMillisecond;  // finish of hi#0, as measured
