@@ -14,7 +14,9 @@ import subprocess
 
 from program import PROGRAM, Case, main, redag, units, wait_for_units
 
-ENVIRONMENT = os.environ | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+# mpirun kills ranks a second after it has asked them to end, in which a busy machine writes no results.
+ENVIRONMENT = os.environ | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+                            "OMPI_MCA_odls_base_sigkill_timeout": "60"}
 PLAN = ["--dags", "6", "--workers", "2", "--utilization", "0.2:0.8:0.2", "--methods", "any,simulation,melani"]
 LONG = [*PLAN, "--sets", "60", "--simulation-periods", "80"]
 
