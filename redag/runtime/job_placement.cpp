@@ -239,6 +239,7 @@ void JobPlacement::apply(std::span<const ThreadPriorities::Change> changes) {
 
 void JobPlacement::set_leader(int priority) {
   of_leader_ = priority;
+  if (pool_.ending()) return;  // threads may have been joined
   for (const auto &thread : pool_.threads()) {
     if (thread->stack.empty() && thread->leads.load(std::memory_order_relaxed)) {
       apply(priorities_.wait(thread->index, of_leader_));
