@@ -175,10 +175,8 @@ class Engine {
   void release(TaskId task, Time nominal);
   /// As above, for a caller that has just read now(): the job arrives at `at`.
   void release(const Release &release, Time at) { release_at(std::span(&release, 1), at); }
-  /// Reports that what the job in this slot waits for has happened. From any thread.
-  void wake(JobSlot job);
-  /// The same for a list of waits, by detail::Wait::next, of any engines. Each engine decides once, when it knows of
-  /// all its jobs.
+  /// Reports that what jobs wait for has happened: a list of waits, by detail::Wait::next, of any engines. Each engine
+  /// decides once, when it knows of all its jobs. From any thread.
   static void wake_all(detail::Wait *waits);
   /// Reports releases that are skipped at once for `reason` (sched::Scheduler::miss).
   void miss(std::span<const Release> releases, Reason reason);
@@ -385,7 +383,7 @@ class Engine {
   bool lets_wait_ = false;  // let_wait() has succeeded
   // let_wait(): wakes jobs that sleep.
   std::unique_ptr<ReleaseThread> sleepers_;
-  // let_wait(): calls of wake() that may still touch this engine although the woken job has ended.
+  // let_wait(): calls of wake_all() that may still touch this engine although the woken job has ended.
   std::shared_ptr<InProgress> wakes_;
   Atomic<Time> origin_{kNever};
   Atomic<bool> halting_{false};

@@ -142,13 +142,6 @@ void Engine::wake(Locked &locked, JobSlot job, Time at) {
   scheduler_->wake(job, at);
 }
 
-void Engine::wake(JobSlot job) {
-  detail::Wait wait;
-  wait.engine = this;
-  wait.job = job;
-  wake_all(&wait);
-}
-
 void Engine::wake_all(detail::Wait *waits) {
   while (waits != nullptr) waits = waits->engine->wake_own(waits);
 }
