@@ -6,7 +6,6 @@
 #pragma once
 
 #include <sys/timerfd.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <atomic>
