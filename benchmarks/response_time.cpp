@@ -20,7 +20,7 @@ struct SimpleTask {
 };
 
 // UUniFast with log-uniform periods. Apart from generate(), so that the task sets behind the measured figures
-// (docs/evidence/analysis_speed.md) stay the same.
+// (docs/evidence/bounds.md) stay the same.
 std::vector<SimpleTask> random_tasks(redag::Rng &rng, std::size_t count, double utilization) {
   std::vector<SimpleTask> tasks;
   for (std::size_t i = 0; i < count; ++i) {

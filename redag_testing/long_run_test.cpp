@@ -29,7 +29,7 @@ namespace {
 constexpr Duration kHour = 3600 * kSecond;
 
 // A random task set with a load from far below the workers' capacity to slightly above it, and everything that makes
-// jobs wait. Apart from contended(), because docs/evidence/long_runs.md has the figures of these seeds.
+// jobs wait. Apart from contended(), because docs/evidence/robustness.md has the figures of these seeds.
 Workload random_task_set(std::uint64_t seed) {
   Rng rng(seed);
   lab::GenerateOptions options;

@@ -41,7 +41,7 @@ struct EndBlock {
 static_assert(sizeof(EndBlock) == 24);
 
 constexpr std::uint64_t kEndBytes = kHeaderBytes + sizeof(EndBlock);
-// Level 6 takes five times as long, for 7 % fewer bytes (docs/evidence/result_files.md).
+// Level 6 takes five times as long, for 7 % fewer bytes (docs/evidence/large_inputs.md).
 constexpr int kLevel = 1;
 
 constexpr std::uint64_t kMostExpansion = 1032;  // of zlib: a block that claims more is a lie
