@@ -3,7 +3,7 @@
 
 // Writes protobuf's wire format (protobuf.dev/programming-guides/encoding). A message is open while its object lives,
 // and appends to a text that it shares with those around it. Own code, because no library that ROS can install for its
-// users does this without generated code (docs/decisions/0025-one-trace-format-for-pictures.md).
+// users does this without generated code.
 #pragma once
 
 #include <cstdint>

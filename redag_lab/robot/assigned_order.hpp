@@ -3,7 +3,9 @@
 
 // Audsley's assignment for a robot (policy `audsley`): the bounds of the union decide which level of which process
 // comes before which. Each process keeps the order of its own levels, because its executor can follow no other with
-// REDAG_LEVELS. Rationale: docs/decisions/0044. Pure.
+// REDAG_LEVELS. The search merges these chains, and Audsley's argument holds for
+// such orders: the last level of a chain can move below all others. Links count the sender's deadline, because its
+// response depends on the order that is searched. Pure.
 #pragma once
 
 #include "redag/base/result.hpp"

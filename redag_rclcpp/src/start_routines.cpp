@@ -18,6 +18,9 @@
 #include "own_memory.hpp"
 #include "redag/base/blocked_signals.hpp"
 
+// Names do not tell the middleware's threads: older Fast DDS does not name them, and users' threads may have any name.
+// glibc keeps a thread's start routine in its descriptor, at a place that no header states. Two threads whose routine
+// is known show the distance from the list of robust mutexes, whose address the kernel tells.
 namespace redag_rclcpp {
 namespace {
 
