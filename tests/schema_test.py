@@ -248,7 +248,7 @@ class SchemaTest(unittest.TestCase):
             document = yaml.safe_load(ROBOT)
             document["threads"][0]["level"] = level
             self.assertEqual(robot_errors(document), [], level)
-        for key, value in (("cpus", "0"), ("processes", []), ("policy", "edf"), ("robots", 1), ("hosts", [{"name": "h", "cpus": 0}])):
+        for key, value in (("cpus", "0"), ("processes", []), ("policy", "edf"), ("robots", 1)):
             self.assertTrue(robot_errors({**yaml.safe_load(ROBOT), key: value}), key)
         for key, value in (("level", "top"), ("level", {"fifo": 100}), ("level", {"rate": "5ms", "fifo": 1}),
                            ("match", {}), ("count", 0), ("wcet", "0ms")):
