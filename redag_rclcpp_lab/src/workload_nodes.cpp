@@ -331,8 +331,7 @@ void WorkloadNodes::execute(TaskNode &task, const Job &job) {
     const auto number = static_cast<std::uint32_t>(job.number);
     const JobEvent started{begin, job.trigger, task.id, number, thread, JobEventKind::Started};
     record(started, events);
-    const TaskId id(options_.first_task + task.id.value);
-    const Duration demand = redag::execution_time(*task.task, id, number, options_.seed);
+    const Duration demand = redag::execution_time(*task.task, task.id, number, options_.seed);
     const bool cut_off =
         task.task->on_budget == redag::OnBudget::Abort && task.task->budget > 0 && demand > task.task->budget;
     use_processor(cut_off ? task.task->budget : demand, task.task->region, started, events);

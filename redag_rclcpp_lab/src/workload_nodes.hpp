@@ -29,7 +29,6 @@ namespace redag_rclcpp::lab {
 
 struct NodesOptions {
   std::uint64_t seed = 1;
-  std::uint32_t first_task = 0;     // added to the TaskIds that decide execution times; see workload_part.hpp
   bool intra_process = true;        // false: messages pass through the middleware
   bool redag = false;               // the executor is ReDAGExecutor: preemption points can suspend bodies
   std::uint32_t threads = 1;        // largest number of threads that execute bodies

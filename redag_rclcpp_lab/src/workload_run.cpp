@@ -29,7 +29,6 @@
 #include "redag_analysis/metrics/trace_checker.hpp"
 #include "redag_rclcpp/executor.hpp"
 #include "workload_nodes.hpp"
-#include "workload_part.hpp"
 
 namespace redag_rclcpp::lab {
 
@@ -56,18 +55,9 @@ std::optional<PreemptionMode> preemption_of(const std::string &name) {
   return std::nullopt;
 }
 
-// In other modes an executor warns that it does not take part in a common order.
-bool can_be_os(PreemptionMode mode) { return mode == PreemptionMode::Os || mode == PreemptionMode::Auto; }
-
 class Run {
  public:
-  Run(const redag::Workload &whole, const WorkloadRunOptions &options)
-      : whole_(whole), workload_(whole), options_(options) {
-    if (options_.only_dag > 0) {
-      WorkloadPart part = part_of(whole_, options_.only_dag - 1);
-      workload_ = std::move(part.workload);
-      first_task_ = part.first_task;
-    }
+  Run(const redag::Workload &workload, const WorkloadRunOptions &options) : workload_(workload), options_(options) {
     // The check judges max_active and groups by this number. The threads that ran bodies can be more.
     workers_ = options_.threads > 0 ? options_.threads : workload_.platform.workers;
     if (has_one_thread(options_.executor)) workers_ = 1;
@@ -79,7 +69,6 @@ class Run {
     if (auto possible = look_at_limits(); !possible) return tl::unexpected(possible.error());
     NodesOptions nodes;
     nodes.seed = options_.seed;
-    nodes.first_task = first_task_;
     nodes.intra_process = options_.intra_process;
     nodes.redag = is_redag(options_.executor);
     nodes.threads = workers_ + (nodes.redag ? kSpareThreads : 0) + 1;
@@ -92,7 +81,7 @@ class Run {
       return redag::make_error(error.what(), options_.executor == "redag-os" ? redag::runtime::realtime_hint() : "");
     }
     if (preempts_by_priority()) nodes_->note_absences();
-    if (auto armed = arm(); !armed) return tl::unexpected(armed.error());
+    nodes_->arm(timer_clock_now() + kStartMargin);
     const Duration cost = nodes_->measurement_cost();
     for (const auto &node : nodes_->nodes()) executor_->add_node(node);
     std::thread spinning([this] { spin(); });
@@ -128,14 +117,6 @@ class Run {
     return {};
   }
 
-  redag::Result<void> arm() {
-    if (!options_.start) {
-      nodes_->arm(timer_clock_now() + kStartMargin);
-      return {};
-    }
-    return options_.start().map([this](Time start) { nodes_->arm(start); });
-  }
-
   void make_executor() {
     const std::string &name = options_.executor;
     if (is_redag(name)) {
@@ -148,7 +129,6 @@ class Run {
       redag.cpus = workload_.platform.cpus;
       redag.workload = nodes_->bound_workload();
       redag.trace_capacity = kSchedulerEvents;
-      redag.share_order = options_.only_dag > 0 && can_be_os(redag.preemption);
       redag_ = std::make_shared<ReDAGExecutor>(redag);
       executor_ = redag_;
     } else {
@@ -282,9 +262,7 @@ class Run {
     result_.scheduler = std::move(scheduler);
   }
 
-  const redag::Workload &whole_;
-  redag::Workload workload_;      // what this process runs of it
-  std::uint32_t first_task_ = 0;  // TaskId of its first task in the whole
+  redag::Workload workload_;
   const WorkloadRunOptions &options_;
   std::uint32_t workers_ = 1;
   WorkloadRun result_;

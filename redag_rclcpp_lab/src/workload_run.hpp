@@ -6,9 +6,7 @@
 #pragma once
 
 #include <atomic>
-#include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -34,9 +32,6 @@ struct WorkloadRunOptions {
   std::uint64_t seed = 1;
   bool intra_process = true;
   std::uint32_t threads = 0;  // 0: the workload's workers; executors with one thread ignore it
-  std::size_t only_dag = 0;   // position of the only DAG that this process runs, from 1; 0: it runs all of them
-  /// Called once, when everything is ready. Returns time 0, on timer_clock_now(). Empty: soon.
-  std::function<redag::Result<redag::Time>()> start{};
   const std::atomic<bool> *stop = nullptr;
 };
 
@@ -55,9 +50,7 @@ struct WorkloadRun {
   bool stopped = false;
 };
 
-/// `workload` must be valid. With `only_dag`, other processes run the other DAGs at the same time: the jobs are those
-/// of the whole workload, and ReDAGExecutor with preemption os shares one order with the others. Errors: requests that
-/// ROS or the machine refuse.
+/// `workload` must be valid. Errors: requests that ROS or the machine refuse.
 [[nodiscard]] redag::Result<WorkloadRun> run_as_nodes(const redag::Workload &workload,
                                                       const WorkloadRunOptions &options);
 

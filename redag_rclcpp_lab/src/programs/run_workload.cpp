@@ -5,21 +5,23 @@
 #include <fmt/format.h>
 #include <pthread.h>
 #include <stdlib.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
+#include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <system_error>
 #include <vector>
 
 #include "command_line.hpp"
-#include "common_start.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "redag/base/check.hpp"
 #include "redag/base/text.hpp"
@@ -29,15 +31,12 @@
 #include "redag/trace/events_file.hpp"
 #include "redag_analysis/metrics/summary.hpp"
 #include "workload_comparison.hpp"
-#include "workload_part.hpp"
 #include "workload_run.hpp"
 
 namespace redag_rclcpp::lab {
 namespace {
 
 namespace fs = std::filesystem;
-// From the last process that is ready to time 0. Executors agree on one order in less than half of it.
-constexpr redag::Duration kStartMargin = redag::kSecond;
 constexpr const char *kDescription =
     R"(Runs a workload as real ROS 2 nodes with synthetic callbacks, and measures
 every job.
@@ -63,30 +62,25 @@ struct Arguments {
   std::uint32_t repeat = 1;
   std::string folder;
   bool force = false;
-  bool in_step = false;  // started by run_together()
 };
 
+// ---- signals ----
+
 std::atomic<bool> interrupted{false};
+std::atomic<pid_t> child{0};
+
+// Async-signal-safe. Passes the signal on to the child: kill(1) reaches this process alone, while the terminal's
+// signals reach both.
+void on_signal(int number) {
+  interrupted.store(true);
+  if (const pid_t to = child.load(); to > 0) kill(to, number);
+}
 
 // ---- arguments ----
 
-/// An executor as --executor names it: `mte`, or `mte-split` for a process for each DAG.
-struct Contender {
-  explicit Contender(const std::string &name) : executor(name) {
-    constexpr std::string_view kSplit = "-split";
-    if (name.size() < kSplit.size() || name.compare(name.size() - kSplit.size(), kSplit.size(), kSplit) != 0) return;
-    executor.resize(name.size() - kSplit.size());
-    split = true;
-  }
-  std::string executor;
-  bool split = false;
-};
-
-bool is_split(const std::string &name) { return Contender(name).split; }
-
 void check_executors(const std::vector<std::string> &names) {
   for (auto name = names.begin(); name != names.end(); ++name) {
-    if (const auto known = check_executor(Contender(*name).executor); !known) {
+    if (const auto known = check_executor(*name); !known) {
       const redag::Diagnostic &mistake = known.error().front();
       throw CLI::ValidationError("--executor", fmt::format("{} ({})", mistake.message, mistake.hint));
     }
@@ -106,9 +100,7 @@ void add_options(CLI::App &app, Arguments &arguments) {
            "redag-cooperative, redag-os. Of rclcpp: mte, ste,\n"
            "static, events. If built: cbg (EventsCBGExecutor).\n"
            "Several run in turn, each in its own process, and\n"
-           "are compared. With '-split' behind a name, as in\n"
-           "mte-split, each DAG has a process of its own;\n"
-           "redag with os then shares one order.");
+           "are compared.");
   add_time(app, "--duration", run.duration, 1, "Time in which jobs are released");
   add_time(app, "--warm-up", run.warm_up, 0, "Do not count jobs released in this time at\nthe start");
   add_number<std::uint64_t>(app, "--seed", run.seed, 0, "Seed of execution times; every executor gets the\nsame jobs");
@@ -124,14 +116,9 @@ void add_options(CLI::App &app, Arguments &arguments) {
       ->default_str("");
   add_number<std::uint32_t>(app, "--repeat", arguments.repeat, 1, "Repetitions, in which the executors take turns");
   app.add_option("--out", arguments.folder,
-                 "Folder for result files, as of 'redag run'; with\n"
-                 "several runs, DIR/EXECUTOR/REPETITION, and with\n"
-                 "-split DIR/EXECUTOR/REPETITION/DAG")
+                 "Folder for result files, as of 'redag run'; with\nseveral runs, DIR/EXECUTOR/REPETITION")
       ->type_name("DIR");
   app.add_flag("--force", arguments.force, "Write into a folder that is not empty");
-  // For the processes that a comparison starts.
-  app.add_flag("--in-step", arguments.in_step)->group("");
-  app.add_option("--only-dag", run.only_dag)->group("");
   app.callback([&] {
     check_executors(arguments.executors);
     if (run.warm_up >= run.duration) {
@@ -159,14 +146,13 @@ int run_once(const redag::Workload &workload, const Arguments &arguments) {
   WorkloadRunOptions options = arguments.run;
   options.executor = arguments.executors.front();
   options.stop = &interrupted;
-  if (arguments.in_step) options.start = await_start;
   const redag::Result<WorkloadRun> run = run_as_nodes(workload, options);
   if (!run) {
     note(run.error());
     return kExitBad;
   }
   for (const std::string &warning : run->warnings) fmt::print(stderr, "warning: {}\n", warning);
-  if (!arguments.in_step) fmt::print("{}", describe(*run));
+  fmt::print("{}", describe(*run));
   if (!arguments.folder.empty()) {
     const redag::Diagnostics problems = write_results(*run, arguments.folder);
     note(problems);
@@ -178,11 +164,10 @@ int run_once(const redag::Workload &workload, const Arguments &arguments) {
 
 // ---- several runs, compared ----
 
-// The command that runs this program for one executor. `dag`: position from 1, or 0 for the whole workload.
-std::vector<std::string> command_of(const Arguments &arguments, const std::string &executor, std::size_t dag,
-                                    const std::string &folder) {
+// Runs this program again for one executor, without its report. Returns its exit status.
+int run_child(const Arguments &arguments, const std::string &executor, const std::string &folder) {
   const WorkloadRunOptions &run = arguments.run;
-  std::vector<std::string> words = {fs::read_symlink("/proc/self/exe").string(),
+  std::vector<std::string> words = {"run_workload",
                                     arguments.file,
                                     "--executor=" + executor,
                                     fmt::format("--duration={}ns", run.duration),
@@ -190,53 +175,25 @@ std::vector<std::string> command_of(const Arguments &arguments, const std::strin
                                     fmt::format("--seed={}", run.seed),
                                     std::string("--transport=") + (run.intra_process ? "intra" : "inter"),
                                     "--force",
-                                    "--out=" + folder,
-                                    "--in-step",
-                                    fmt::format("--only-dag={}", dag)};
+                                    "--out=" + folder};
   if (run.threads > 0) words.push_back(fmt::format("--threads={}", run.threads));
-  return words;
-}
-
-/// One repetition with one contender.
-struct Repetition {
-  int status = kExitBad;
-  std::vector<redag::metrics::DagSummary> dags;
-  bool real_time = false;  // some process ran with preemption os
-};
-
-// Runs one repetition in a process, or in one for each DAG, and reads the results from `folder`.
-Repetition run_repetition(const redag::Workload &workload, const Arguments &arguments, const std::string &name,
-                          const std::string &folder) {
-  const Contender contender(name);
-  std::vector<std::string> folders;
-  std::vector<std::vector<std::string>> commands;
-  for (std::size_t dag = 0; dag < (contender.split ? workload.dags.size() : 1); ++dag) {
-    folders.push_back(contender.split ? fmt::format("{}/{}", folder, folder_of_part(workload, dag)) : folder);
-    commands.push_back(command_of(arguments, contender.executor, contender.split ? dag + 1 : 0, folders.back()));
+  std::vector<char *> argv;
+  for (std::string &word : words) argv.push_back(word.data());
+  argv.push_back(nullptr);
+  const pid_t pid = fork();
+  if (pid < 0) return kExitBad;
+  if (pid == 0) {
+    if (std::freopen("/dev/null", "w", stdout) == nullptr) _exit(kExitBad);
+    execv("/proc/self/exe", argv.data());
+    _exit(kExitBad);
   }
-  Repetition repetition;
-  const redag::Result<std::vector<int>> statuses =
-      run_together(commands, kStartMargin, [] { return interrupted.load(); });
-  if (!statuses) {
-    note(statuses.error());
-    return repetition;
+  child.store(pid);
+  if (interrupted) kill(pid, SIGINT);  // the signal came before the child had its number
+  int status = 0;
+  while (waitpid(pid, &status, 0) < 0 && errno == EINTR) {
   }
-  int worst = kExitOk;
-  for (const int status : *statuses)
-    worst = std::max(worst, status == kExitOk || status == kExitNo ? status : kExitBad);
-  if (worst == kExitBad) return repetition;
-  for (const std::string &place : folders) {
-    const redag::Result<redag::trace::Trace> trace = redag::trace::read_trace(place + "/events.redag");
-    if (!trace) {
-      note(trace.error());
-      return repetition;
-    }
-    const std::vector<redag::metrics::DagSummary> dags = redag::metrics::summarize(*trace).dags;
-    repetition.dags.insert(repetition.dags.end(), dags.begin(), dags.end());
-    repetition.real_time = repetition.real_time || trace->info.preemption == "os";
-  }
-  repetition.status = worst;
-  return repetition;
+  child.store(0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : kExitBad;
 }
 
 int compare(const redag::Workload &workload, const Arguments &arguments, const std::string &folder) {
@@ -249,19 +206,21 @@ int compare(const redag::Workload &workload, const Arguments &arguments, const s
       if (interrupted) break;
       fmt::print(stderr, "{} of {}: {}\n", repetition + 1, arguments.repeat, executor);
       const std::string place = fmt::format("{}/{}/{}", folder, executor, repetition + 1);
-      const Repetition run = run_repetition(workload, arguments, executor, place);
+      const int status = run_child(arguments, executor, place);
       if (interrupted) break;  // a shorter run is not comparable
-      if (run.status == kExitBad) {
+      const redag::Result<redag::trace::Trace> trace = redag::trace::read_trace(place + "/events.redag");
+      if (status == kExitBad || !trace) {
         fmt::print(stderr, "error: the run with executor {} failed\n", executor);
+        if (status != kExitBad) note(trace.error());
         failed = true;
         break;
       }
-      if (run.status == kExitNo) {
-        fmt::print(stderr, "error: {} broke the model's rules: see check.json in {}\n", executor, place);
+      if (status == kExitNo) {
+        fmt::print(stderr, "error: {} broke the model's rules: see {}/check.json\n", executor, place);
         lawful = false;
       }
-      real_time = real_time || run.real_time;
-      results[executor].push_back(run.dags);
+      real_time = real_time || trace->info.preemption == "os";
+      results[executor].push_back(redag::metrics::summarize(*trace).dags);
     }
   }
   if (!results.empty()) {
@@ -315,26 +274,14 @@ int run(int argc, char **argv) {
     note(one.error());
     return kExitBad;
   }
-  if (arguments.run.only_dag > loaded->workload.dags.size()) {
-    note(
-        redag::make_error(fmt::format("there is no DAG {} of {}", arguments.run.only_dag, loaded->workload.dags.size()))
-            .value());
-    return kExitBad;
-  }
   if (!arguments.folder.empty()) {
     if (const redag::Result<void> made = prepare_folder(arguments.folder, arguments.force); !made) {
       note(made.error());
       return kExitBad;
     }
   }
-  if (std::any_of(arguments.executors.begin(), arguments.executors.end(), is_split)) {
-    if (const redag::Result<void> possible = check_parts(loaded->workload); !possible) {
-      note(possible.error());
-      return kExitBad;
-    }
-  }
-  on_interrupt([](int) { interrupted.store(true); });
-  const bool several = arguments.executors.size() > 1 || arguments.repeat > 1 || is_split(arguments.executors.front());
+  on_interrupt(on_signal);
+  const bool several = arguments.executors.size() > 1 || arguments.repeat > 1;
   note(loaded->warnings);
   if (several) return run_all(loaded->workload, arguments);
   rclcpp::init(argc, argv, rclcpp::InitOptions(), rclcpp::SignalHandlerOptions::None);
