@@ -158,9 +158,8 @@ class Judge {
     for (auto &[key, job] : jobs_) {
       const bool waiting = waits(job);
       contended = contended || waiting;
-      const bool is_judged = !run_.judged || run_.judged(key.first);
       const bool overtaken = least != nullptr && least->second.level > job.level;
-      if (!waiting || !is_judged || !(idle || overtaken)) {
+      if (!waiting || !(idle || overtaken)) {
         job.inverted_since = kNever;
         continue;
       }

@@ -13,7 +13,6 @@
 #include <sys/types.h>
 
 #include <cstdint>
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -39,8 +38,6 @@ struct KernelRun {
   std::vector<Decision> decisions;  // by time
   std::vector<int> cpus;            // the processors of the jobs; `events` has all of them
   Time end = kNever;                // nothing is judged from then on
-  /// The tasks whose waiting counts; empty: all tasks.
-  std::function<bool(std::uint32_t task)> judged;
 };
 
 struct KernelVerdict {

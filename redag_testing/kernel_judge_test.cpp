@@ -153,12 +153,6 @@ TEST(KernelJudge, AProcessorThatIdlesIsSeen) {
   EXPECT_EQ(record.judged().violation_count, 1U);
 }
 
-TEST(KernelJudge, SomeJobsMayNotBeJudged) {
-  Record record = inverted(100);
-  record.run().judged = [](std::uint32_t task) { return task == 1; };
-  EXPECT_EQ(record.judged().violation_count, 0U);
-}
-
 TEST(KernelJudge, ABodyThatWasNotToStartIsSeen) {
   Record record(1);
   record.body(kUrgent, kUrgentThread, 1, 45);

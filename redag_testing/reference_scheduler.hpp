@@ -40,7 +40,6 @@ class ReferenceScheduler final : public sched::Scheduler {
   void set_timing(TaskId task, Duration period, Duration deadline, Time now) override;
   void close(Time now) override;
   [[nodiscard]] std::span<const TaskId> tasks_of(DagId dag) const override { return dags_[dag.value].tasks; }
-  [[nodiscard]] Criticality criticality(DagId dag) const override { return dags_[dag.value].dag.criticality; }
   [[nodiscard]] std::size_t task_slots() const override { return tasks_.size(); }
   [[nodiscard]] std::size_t dag_slots() const override { return dags_.size(); }
   [[nodiscard]] sched::Accounting accounting(TaskId task) const override;

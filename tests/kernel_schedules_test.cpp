@@ -189,8 +189,7 @@ class KernelSchedules : public ::testing::Test {
 
   // Compares what the kernel ran with what the reference scheduler would have run.
   void judge_run(SwitchRecorder recorder, const BodyLog &bodies, const RecordingScheduler::Log &log,
-                 const Workload &workload, sched::Config config, std::function<bool(std::uint32_t)> judged,
-                 const std::string &replay) {
+                 const Workload &workload, sched::Config config, const std::string &replay) {
     Result<std::vector<SwitchEvent>> events = recorder.stop();
     std::optional<std::vector<BodyRun>> runs = bodies.runs();
     if (!events || !runs) {
@@ -205,7 +204,6 @@ class KernelSchedules : public ::testing::Test {
     run.events = *std::move(events);
     run.bodies = *std::move(runs);
     run.cpus = cpus_of(config.workers);
-    run.judged = std::move(judged);
     const KernelVerdict verdict = judge(run);
     EXPECT_EQ(verdict.violation_count, 0U) << fmt::format("{}\n{}", fmt::join(verdict.violations, "\n"), replay);
     EXPECT_EQ(differences, 0U) << replay;
@@ -236,10 +234,10 @@ class KernelSchedules : public ::testing::Test {
     ASSERT_TRUE(recorder);
     const auto result = lab::run_workload(workload, options);
     ASSERT_TRUE(result) << to_string(result.error());
-    judge_run(*std::move(recorder), bodies, *log, workload, used, {}, replay);
+    judge_run(*std::move(recorder), bodies, *log, workload, used, replay);
   }
 
-  void run_reconfigured(std::uint64_t seed, bool throttled, const std::string &replay);
+  void run_reconfigured(std::uint64_t seed, const std::string &replay);
 
   // Runs both kinds of schedules in turn.
   void run_many(std::uint64_t first, std::uint64_t count) {
@@ -252,7 +250,7 @@ class KernelSchedules : public ::testing::Test {
         Rng rng(seed);
         run_as_workload(random_workload(rng, random_workers(rng)), seed, replay);
       } else {
-        run_reconfigured(seed, seed % 6 == 1, replay);
+        run_reconfigured(seed, replay);
       }
     }
   }
@@ -288,8 +286,6 @@ class ChangingRun {
     }
   }
 
-  [[nodiscard]] const std::vector<bool> &is_high() const { return is_high_; }
-
  private:
   struct Known {
     DagId id;
@@ -310,8 +306,6 @@ class ChangingRun {
     Known known{id, ids, {}};
     for (std::size_t i = 0; i < ids.size(); ++i) {
       if (dag.tasks[i].activation == Activation::Timer) known.timers.push_back(ids[i]);
-      if (ids[i].value >= is_high_.size()) is_high_.resize(ids[i].value + 1);
-      is_high_[ids[i].value] = dag.criticality == Criticality::High;
     }
     dags_.push_back(known);
   }
@@ -353,20 +347,17 @@ class ChangingRun {
   runtime::Engine &engine_;
   BodyLog &bodies_;
   std::vector<Known> dags_;
-  std::vector<bool> is_high_;  // indexed by task
   std::size_t next_ = 0;
   std::size_t next_dag_ = 0;
 };
 
-// With `throttled`, jobs of lower criticality are demoted, and only the waits of the other jobs are judged.
-void KernelSchedules::run_reconfigured(std::uint64_t seed, bool throttled, const std::string &replay) {
+void KernelSchedules::run_reconfigured(std::uint64_t seed, const std::string &replay) {
   Rng rng(seed);
   const std::uint32_t workers = random_workers(rng);
   const Workload workload = random_workload(rng, workers);
   runtime::EngineOptions options;
   options.config = runtime::make_config(runtime::Mode{PreemptionMode::Os, {}}, workers, workload.policy, band_, 64);
   options.band = band_;
-  if (throttled) options.throttling = runtime::Throttling{500'000, 1'000'000};
   const auto log = RecordingScheduler::make_log();
   BodyLog bodies(1U << 14U);
   runtime::Engine engine(
@@ -388,10 +379,7 @@ void KernelSchedules::run_reconfigured(std::uint64_t seed, bool throttled, const
   engine.halt();
   ASSERT_TRUE(engine.wait_idle(kNever));
   engine.join();
-  std::function<bool(std::uint32_t)> judged;
-  if (throttled)
-    judged = [&](std::uint32_t task) { return task < changing.is_high().size() && changing.is_high()[task]; };
-  judge_run(*std::move(recorder), bodies, *log, workload, options.config, std::move(judged), replay);
+  judge_run(*std::move(recorder), bodies, *log, workload, options.config, replay);
 }
 
 TEST_F(KernelSchedules, TheMostUrgentStartedJobsHaveTheProcessors) {

@@ -49,10 +49,6 @@ Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions option
     const JobEventKind counted = options_.measure ? JobEventKind::Preempted : JobEventKind::Skipped;
     scheduler_->record_only({JobEventKind::Skipped, counted});
   }
-  if (os() && options_.throttling) {
-    guard_.emplace(*options_.throttling, pool_, placement_);
-    guard_thread_ = std::make_unique<HelperThread>();
-  }
   if (os() && !options_.order_folder.empty()) {
     REDAG_CHECK(options_.band.shared, "the band of a shared order is shared");
     order_thread_ = std::make_unique<HelperThread>();
@@ -84,10 +80,8 @@ Result<void> Engine::start() {
   const Time at = now();
   Locked locked(*this);
   withdraw_if_halting(locked);
-  if (cpus.empty()) cpus = usable;
   move_releases();
-  placement_.start(std::min(cpus.size(), usable.size()));
-  if (guard_) guard_->start(cpus);
+  placement_.start(cpus.empty() ? usable.size() : std::min(cpus.size(), usable.size()));
   running_ = true;
   decide(locked, at);
   return {};
@@ -96,9 +90,6 @@ Result<void> Engine::start() {
 Result<void> Engine::start_threads(const std::vector<int> &cpus) {
   const ThreadSetup setup{options_.name, realtime() ? options_.band.top_job : 0, cpus, options_.touched_stack};
   Result<void> started = pool_.start(setup, [this](WorkerThread &self) { main(self); });
-  if (started && guard_thread_) {
-    started = start_helper(*guard_thread_, "guard", options_.band.timer, [this] { guard_throttling(); });
-  }
   if (started && order_thread_) started = start_order();
   if (started && lookout_) {
     started = start_helper(*lookout_, "lookout", 0, [this] { look_out(); });
@@ -115,7 +106,7 @@ Result<void> Engine::start_helper(HelperThread &helper, const char *name, int pr
 
 void Engine::end_threads() {
   pool_.end();
-  for (HelperThread *helper : {guard_thread_.get(), order_thread_.get(), lookout_.get()}) {
+  for (HelperThread *helper : {order_thread_.get(), lookout_.get()}) {
     if (helper == nullptr) continue;
     helper->parker.unpark();
     if (helper->handle.joinable()) helper->handle.join();
@@ -185,26 +176,6 @@ void Engine::join() {
   if (lets_wait_) end_waits();
 }
 
-// The throttling guard: sleeps until a job is in progress, then checks several times a second while there are jobs.
-void Engine::guard_throttling() noexcept {
-  for (Duration until_next = kNever;;) {
-    if (until_next == kNever) {
-      guard_thread_->parker.park();
-    } else {
-      guard_thread_->parker.park_until(monotonic_now() + until_next);
-    }
-    if (pool_.ending()) return;
-    until_next = look_at_throttling();
-  }
-}
-
-// Returns the time until the next look; kNever: not before the guard is woken.
-Duration Engine::look_at_throttling() {
-  const Time at = now();
-  Locked locked(*this);
-  return guard_->look(at, tasks_.can_give_way());
-}
-
 // The lookout: sleeps until it is woken because mail is silent, then looks at intervals while that goes on.
 void Engine::look_out() noexcept {
   for (bool again = false;;) {
@@ -231,17 +202,11 @@ void Engine::decide(Locked &locked, Time now, Taker *taker) {
 // Passes a step of the scheduler on to the threads.
 void Engine::carry_out(Locked &locked, const sched::Step &step, Time now, Taker *taker) {
   if (!step.events.empty()) report(locked, step.events);
-  const bool guards = is_guarded();
-  // Wakes the throttling guard before any job: a job above the calling thread may delay everything that follows. The
-  // guard is above all jobs and waits for the lock. Its owner is raised meanwhile, and no job preempts it.
-  const bool has_jobs = placement_.unfinished() > 0 || !step.dispatches.empty();
-  if (guards && has_jobs && guard_->must_wake()) locked.wake_ups().wake_helper(guard_thread_->parker);
   if (taker != nullptr || !step.dispatches.empty()) {
     const bool may_lead = releases_ != nullptr && releases_->expects();
     placement_.place(step, Situation{now, locked.waited(), may_lead}, taker, tasks_, locked.wake_ups());
   }
   if (options_.config.preemption == sched::Preemption::Cooperative) refresh_outranked();
-  if (guards) guard_->note(now);
   if (waiting_.has_cancelled()) wake_cancelled(locked, now);
 }
 
@@ -402,12 +367,6 @@ bool Engine::wait_idle(Time deadline) {
 
 // ---- what can be asked ----
 
-Duration Engine::gave_way() const {
-  const Time at = now();
-  const LockGuard guard(lock_);
-  return guard_ ? guard_->gave_way(at) : 0;
-}
-
 std::uint64_t Engine::thread_waits() const {
   const LockGuard guard(lock_);
   return scheduler_->thread_waits();
@@ -436,12 +395,6 @@ std::vector<Problem> Engine::problems() const {
         {fmt::format("jobs waited for a thread {} times, because all {} threads had jobs in progress "
                      "(raise 'threads')",
                      waits, pool_.size())});
-  }
-  if (const Duration gave_way = this->gave_way(); gave_way > 0) {
-    problems.push_back(
-        {fmt::format("jobs of lower criticality ran on ordinary threads for {}, so that the kernel's "
-                     "real-time throttling did not stop those of high criticality",
-                     humanize_duration(gave_way))});
   }
   return problems;
 }

@@ -39,7 +39,6 @@
 #include "redag/runtime/release_thread.hpp"
 #include "redag/runtime/setup.hpp"
 #include "redag/runtime/task_table.hpp"
-#include "redag/runtime/throttling_guard.hpp"
 #include "redag/runtime/waiting_jobs.hpp"
 #include "redag/runtime/worker_pool.hpp"
 #include "redag/sched/scheduler.hpp"
@@ -57,9 +56,6 @@ struct EngineOptions {
   std::string name = "redag";  // prefix of the threads' names
   sched::Config config;        // the scheduler's configuration; Full means `os`, with max_started threads
   PriorityBand band;           // for os and realtime_threads
-  // os: the kernel's throttling. If there are DAGs of high criticality, jobs of the others are demoted to ordinary
-  // threads before the kernel takes the processor from all.
-  std::optional<Throttling> throttling;
   // os, with a policy that rate_of() knows: from start() on, shares one order with the executors that have pages in
   // this folder. `band` must be shared. Empty: has an order of its own.
   std::string order_folder;
@@ -251,8 +247,6 @@ class Engine {
   void figures(std::vector<ThreadFigures> &out) const;
   /// Replaces `out` by the figures of all devices, by DeviceId.
   void figures(std::vector<DeviceFigures> &out) const;
-  /// For how long jobs that are not of high criticality were demoted to ordinary threads because of throttling.
-  [[nodiscard]] Duration gave_way() const;
   /// How often a job could have had a processor but waited for a thread, because all threads had jobs.
   [[nodiscard]] std::uint64_t thread_waits() const;
   /// What is not as promised, the worst first. The one list for all front ends.
@@ -295,7 +289,6 @@ class Engine {
   void idle(WorkerThread &self) noexcept;
   void lead(WorkerThread &self) noexcept;
   void follow(WorkerThread &self) noexcept;
-  void guard_throttling() noexcept;
   void look_out() noexcept;
   void run(Taker &taker, Time at) noexcept;
   Time run_next(Taker &taker, RunningJob &running, Time at, Body &doomed) noexcept;
@@ -321,7 +314,6 @@ class Engine {
   void decide(Locked &locked, Time now, Taker *taker = nullptr) REDAG_REQUIRES(lock_);
   void carry_out(Locked &locked, const sched::Step &step, Time now, Taker *taker) REDAG_REQUIRES(lock_);
   void report(Locked &locked, std::span<const JobEvent> events) REDAG_REQUIRES(lock_);
-  Duration look_at_throttling() REDAG_EXCLUDES(lock_);
   void refresh_outranked() REDAG_REQUIRES(lock_);
   void register_task(TaskId id, const Task &task, const TaskRole &role, Body &body,
                      std::shared_ptr<SkipListener> listener = nullptr) REDAG_REQUIRES(lock_);
@@ -338,13 +330,8 @@ class Engine {
   bool wait_for(std::optional<bool> (Engine::*question)(Locked &), Time deadline) REDAG_EXCLUDES(lock_);
   void wake_pause_waiters() REDAG_REQUIRES(lock_);
   void end_of_jobs() REDAG_REQUIRES(lock_);
-  /// Returns true if the throttling guard sees each decision.
-  [[nodiscard]] bool is_guarded() const REDAG_REQUIRES(lock_) { return guard_ && tasks_.can_give_way(); }
-  /// Returns true if a thread may begin its next job without carry_out(): neither the guard nor preemption points need
-  /// to know of it.
-  [[nodiscard]] bool may_hand_over() const REDAG_REQUIRES(lock_) {
-    return options_.config.preemption != sched::Preemption::Cooperative && !is_guarded();
-  }
+  /// Returns true if a thread may begin its next job without carry_out(): preemption points need not know of it.
+  [[nodiscard]] bool may_hand_over() const { return options_.config.preemption != sched::Preemption::Cooperative; }
   [[nodiscard]] bool may_start() const REDAG_REQUIRES(lock_) { return running_ && !paused_; }
 
   [[nodiscard]] bool os() const { return options_.config.preemption == sched::Preemption::Full; }
@@ -361,8 +348,7 @@ class Engine {
   DeviceThreads devices_;
   WaitingJobs waiting_ REDAG_GUARDED_BY(lock_);
   JobPlacement placement_ REDAG_GUARDED_BY(lock_);
-  std::optional<ThrottlingGuard> guard_ REDAG_GUARDED_BY(lock_);  // os, throttled
-  bool running_ REDAG_GUARDED_BY(lock_) = false;                  // the threads have been started
+  bool running_ REDAG_GUARDED_BY(lock_) = false;  // the threads have been started
   bool paused_ REDAG_GUARDED_BY(lock_);
   std::uint32_t pause_waiters_ REDAG_GUARDED_BY(lock_) = 0;
   FutexWord pause_changes_{0};  // counts what wait_paused() and wait_quiet() wait for; written under the lock
@@ -371,7 +357,6 @@ class Engine {
   trace::Ring decisions_;  // written under the lock
   EventMerge merge_;       // drain() only
   Event idle_event_;
-  std::unique_ptr<HelperThread> guard_thread_;  // os, throttled
   // With `order_folder`. The page and the statement are start()'s, then the thread's.
   std::unique_ptr<HelperThread> order_thread_;
   std::unique_ptr<live::OwnOrderPage> order_page_;

@@ -50,7 +50,6 @@ TaskId Engine::add_task(DagId dag, std::uint32_t rank, const Task &task, Body bo
   const TaskId id = scheduler_->add_task(dag, rank, task, at);
   // Its jobs can carry older data. Only the caller knows what follows the task.
   const TaskRole role{.dag = dag,
-                      .is_high = scheduler_->criticality(dag) == Criticality::High,
                       .is_sink = true,
                       .has_predecessors = true,
                       .dag_deadline = dag.value < dag_deadlines_.size() ? dag_deadlines_[dag.value] : 0};
@@ -109,7 +108,6 @@ void Engine::register_dag(DagId id, const Dag &dag, std::span<const TaskId> ids,
   }
   for (std::size_t i = 0; i < dag.tasks.size(); ++i) {
     const TaskRole role{.dag = id,
-                        .is_high = dag.criticality == Criticality::High,
                         .is_sink = !has_successor[i],
                         .has_predecessors = !dag.tasks[i].predecessors.empty(),
                         .dag_deadline = dag.deadline};

@@ -67,7 +67,6 @@ Executor::Impl::Impl(ExecutorOptions options) : options_(std::move(options)) {
   engine.config.reuse_ids = options_.trace_capacity == 0;  // in a trace an id means one task
   engine.band = setup_.band;
   engine.order_folder = setup_.order_folder;
-  engine.throttling = setup_.throttling;
   engine.cpus = options_.cpus;
   engine.trace_capacity = options_.trace_capacity;
   engine.measure = options_.live || options_.measure;

@@ -37,7 +37,7 @@ void JobPlacement::start(std::size_t processors) {
 // most urgent job to start. Therefore none of the threads that it wakes preempts it under the lock.
 void JobPlacement::place(const sched::Step &step, const Situation &situation, Taker *taker, TaskTable &tasks,
                          WakeUps &wake_ups) {
-  const bool have_levels = os_ && step.dispatches.size() > 1 && change_several_levels(step, tasks);
+  const bool have_levels = os_ && step.dispatches.size() > 1 && change_several_levels(step);
   const Dispatch *own = taker == nullptr ? nullptr : serve(*taker, step, situation, tasks);
   for (const Dispatch &dispatch : step.dispatches) {
     if (&dispatch == own) continue;
@@ -48,7 +48,7 @@ void JobPlacement::place(const sched::Step &step, const Situation &situation, Ta
       }
       if (const WaitingJob *woken = find_woken(dispatch)) {
         if (taker != nullptr && taker->below.valid() && dispatch.over == taker->below) yield(*taker);
-        end_lending(*woken->thread, dispatch, tasks[dispatch.task], wake_ups);
+        end_lending(*woken->thread, dispatch, wake_ups);
         continue;
       }
       if (dispatch.kind == DispatchKind::Resume) {
@@ -58,7 +58,7 @@ void JobPlacement::place(const sched::Step &step, const Situation &situation, Ta
           end_yield(dispatch.job, wake_ups);
         }
       }
-      if (os_ && !have_levels) change_level(dispatch, tasks);
+      if (os_ && !have_levels) change_level(dispatch);
       continue;
     }
     TaskEntry &entry = tasks[dispatch.task];
@@ -124,18 +124,17 @@ void JobPlacement::leave(WorkerThread &thread) {
 }
 
 // The thread has the job from now on.
-WaitingJob &JobPlacement::take_woken(WorkerThread &thread, const Dispatch &dispatch, const TaskEntry &entry) {
+WaitingJob &JobPlacement::take_woken(WorkerThread &thread, const Dispatch &dispatch) {
   WaitingJob &job = *waiting_.find(dispatch.job);
   waiting_.remove(dispatch.job);
   job.job.worker = dispatch.worker;
   thread.level = dispatch.level;
-  thread.is_spared = dispatch.inherits || entry.is_high;
   return job;
 }
 
 void JobPlacement::fill_woken(WorkerThread &thread, const Dispatch &dispatch, const TaskEntry &entry,
                               Assignment &assignment) {
-  WaitingJob &job = take_woken(thread, dispatch, entry);
+  WaitingJob &job = take_woken(thread, dispatch);
   assignment.job = job.job;
   assignment.entry = job.entry;
   assignment.woken = &job;
@@ -143,9 +142,8 @@ void JobPlacement::fill_woken(WorkerThread &thread, const Dispatch &dispatch, co
   assignment.expected_short = entry.expected_short();
 }
 
-void JobPlacement::end_lending(WorkerThread &thread, const Dispatch &dispatch, const TaskEntry &entry,
-                               WakeUps &wake_ups) {
-  WaitingJob &job = take_woken(thread, dispatch, entry);
+void JobPlacement::end_lending(WorkerThread &thread, const Dispatch &dispatch, WakeUps &wake_ups) {
+  WaitingJob &job = take_woken(thread, dispatch);
   job.thread = nullptr;
   thread.stack.push_back(job.job);
   --blocking_;
@@ -165,7 +163,6 @@ void JobPlacement::move_job(WorkerThread &from, WorkerThread &to, bool may_lead,
   to.stack.push_back(from.stack.back());
   from.stack.pop_back();
   to.level = from.level;
-  to.is_spared = from.is_spared;
   if (os_) priorities_.end(from.index);
   set_priority_for_job(to, assignment);
   add_idle(from, may_lead);
@@ -191,12 +188,12 @@ void JobPlacement::end_yield(JobSlot job, WakeUps &wake_ups) {
 
 // Started jobs get new levels together where a task or a DAG has come, gone or changed, or HI mode begins. Returns true
 // if that was done: one after the other, two threads could be in the wrong order for a moment.
-bool JobPlacement::change_several_levels(const sched::Step &step, const TaskTable &tasks) {
+bool JobPlacement::change_several_levels(const sched::Step &step) {
   const auto changes = [](const Dispatch &dispatch) { return dispatch.kind == DispatchKind::Level; };
   if (std::count_if(step.dispatches.begin(), step.dispatches.end(), changes) < 2) return false;
   for (const Dispatch &dispatch : step.dispatches) {
     if (changes(dispatch) || (dispatch.kind == DispatchKind::Resume && !needs_thread(dispatch))) {
-      static_cast<void>(set_level(dispatch, tasks));
+      static_cast<void>(set_level(dispatch));
     }
   }
   follow_levels();
@@ -205,7 +202,7 @@ bool JobPlacement::change_several_levels(const sched::Step &step, const TaskTabl
 
 // Returns the thread that has the job. Null: the job waits, and is told its level when it goes on, or it runs at the
 // priority of the thread that called run_one().
-WorkerThread *JobPlacement::set_level(const Dispatch &dispatch, const TaskTable &tasks) {
+WorkerThread *JobPlacement::set_level(const Dispatch &dispatch) {
   if (waiting_.find(dispatch.job) != nullptr) return nullptr;
   const auto runs_it = [&](const WorkerThread &t) { return !t.stack.empty() && t.stack.back().slot == dispatch.job; };
   if (runs_it(pool_.caller())) return nullptr;
@@ -213,22 +210,21 @@ WorkerThread *JobPlacement::set_level(const Dispatch &dispatch, const TaskTable 
                                    [&](const auto &candidate) { return runs_it(*candidate); });
   REDAG_CHECK(thread != pool_.threads().end(), "a job goes on that no thread has");
   (*thread)->level = dispatch.level;
-  (*thread)->is_spared = dispatch.inherits || tasks[dispatch.task].is_high;
   return thread->get();
 }
 
-void JobPlacement::change_level(const Dispatch &dispatch, const TaskTable &tasks) {
-  const WorkerThread *const thread = set_level(dispatch, tasks);
+void JobPlacement::change_level(const Dispatch &dispatch) {
+  const WorkerThread *const thread = set_level(dispatch);
   if (thread != nullptr) apply(priorities_.change(thread->index, priority_of(*thread)));
 }
 
 // The job of a thread is followed by this one.
 void JobPlacement::move_priority(WorkerThread &thread, const Assignment &assignment) {
-  apply(priorities_.follow(thread.index, priority_of(thread), keeps_priority(thread, assignment)));
+  apply(priorities_.follow(thread.index, priority_of(thread), keeps_priority(assignment)));
 }
 
 void JobPlacement::set_priority_for_job(WorkerThread &thread, const Assignment &assignment) {
-  if (os_) apply(priorities_.start(thread.index, priority_of(thread), keeps_priority(thread, assignment)));
+  if (os_) apply(priorities_.start(thread.index, priority_of(thread), keeps_priority(assignment)));
 }
 
 void JobPlacement::apply(std::span<const ThreadPriorities::Change> changes) {
@@ -255,13 +251,6 @@ void JobPlacement::follow_levels() {
   }
   sort_without_inversion(moves_);
   for (const PriorityMove &move : moves_) apply(priorities_.change(move.thread, move.to));
-}
-
-void JobPlacement::give_way(bool give_way) {
-  giving_way_ = give_way;
-  for (const auto &thread : pool_.threads()) {
-    if (!thread->stack.empty()) apply(priorities_.change(thread->index, priority_of(*thread)));
-  }
 }
 
 }  // namespace redag::runtime

@@ -116,14 +116,6 @@ class JobPlacement {
   /// os: the priority of a job with this level.
   [[nodiscard]] int priority_of_level(std::uint32_t level) const { return band_.of_level(level); }
 
-  /// os, throttled: from now on, jobs that are not spared run on ordinary threads, or no longer do so.
-  void give_way(bool give_way);
-  [[nodiscard]] bool gives_way() const { return giving_way_; }
-  /// Returns true if the thread has a job at a real-time priority.
-  [[nodiscard]] bool is_realtime(const WorkerThread &thread) const {
-    return priorities_.any_realtime() && !thread.stack.empty() && !gives_way(thread);
-  }
-
  private:
   /// Returns true if the job needs a thread: it starts, or it has waited and goes on.
   [[nodiscard]] bool needs_thread(const sched::Dispatch &dispatch) const {
@@ -151,8 +143,8 @@ class JobPlacement {
   }
   void fill_woken(WorkerThread &thread, const sched::Dispatch &dispatch, const TaskEntry &entry,
                   Assignment &assignment);
-  WaitingJob &take_woken(WorkerThread &thread, const sched::Dispatch &dispatch, const TaskEntry &entry);
-  void end_lending(WorkerThread &thread, const sched::Dispatch &dispatch, const TaskEntry &entry, WakeUps &wake_ups);
+  WaitingJob &take_woken(WorkerThread &thread, const sched::Dispatch &dispatch);
+  void end_lending(WorkerThread &thread, const sched::Dispatch &dispatch, WakeUps &wake_ups);
   static void fill(WorkerThread &thread, const sched::Dispatch &dispatch, TaskEntry &entry, Assignment &assignment) {
     REDAG_CHECK(entry.busy < entry.concurrency, "more jobs of one task at a time than it allows");
     ++entry.busy;
@@ -167,26 +159,21 @@ class JobPlacement {
     assignment.measured = entry.always_measured;
     assignment.expected_short = entry.expected_short();
     thread.level = dispatch.level;
-    thread.is_spared = dispatch.inherits || entry.is_high;
   }
   void yield(Taker &taker);
   void end_yield(JobSlot job, WakeUps &wake_ups);
-  bool change_several_levels(const sched::Step &step, const TaskTable &tasks);
-  WorkerThread *set_level(const sched::Dispatch &dispatch, const TaskTable &tasks);
-  void change_level(const sched::Dispatch &dispatch, const TaskTable &tasks);
+  bool change_several_levels(const sched::Step &step);
+  WorkerThread *set_level(const sched::Dispatch &dispatch);
+  void change_level(const sched::Dispatch &dispatch);
   void set_priority_for_job(WorkerThread &thread, const Assignment &assignment);
   void move_priority(WorkerThread &thread, const Assignment &assignment);
-  /// A thread with a short job may keep a higher priority from its previous one, but not a demoted thread, and not
-  /// where jobs of other processes can have a priority in between.
-  [[nodiscard]] bool keeps_priority(const WorkerThread &thread, const Assignment &assignment) const {
-    return assignment.expected_short && !band_.shared && !gives_way(thread);
+  /// A thread with a short job may keep a higher priority from its previous one, but not where jobs of other processes
+  /// can have a priority in between.
+  [[nodiscard]] bool keeps_priority(const Assignment &assignment) const {
+    return assignment.expected_short && !band_.shared;
   }
   void apply(std::span<const ThreadPriorities::Change> changes);
-  /// Returns true if the thread's job is demoted to an ordinary thread, because real-time threads are throttled.
-  [[nodiscard]] bool gives_way(const WorkerThread &thread) const { return giving_way_ && !thread.is_spared; }
-  [[nodiscard]] int priority_of(const WorkerThread &thread) const {
-    return gives_way(thread) ? 0 : band_.of_level(thread.level);
-  }
+  [[nodiscard]] int priority_of(const WorkerThread &thread) const { return band_.of_level(thread.level); }
 
   WorkerPool &pool_;
   WaitingJobs &waiting_;
@@ -200,7 +187,6 @@ class JobPlacement {
   std::uint32_t yielding_ = 0;  // threads that wait after Next::Kind::Yield
   std::uint32_t unfinished_ = 0;
   std::uint64_t refused_priorities_ = 0;
-  bool giving_way_ = false;
   int of_leader_;  // os: its priority while it waits
 };
 

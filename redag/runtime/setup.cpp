@@ -153,11 +153,11 @@ Result<Setup> set_up(const SetupRequest &request) {
   const std::uint32_t threads = std::max(request.threads == 0 ? workers + kSpareThreads : request.threads, workers);
   setup.config = make_config(setup.mode, workers, request.policy, setup.band, threads);
   setup.config.ties = request.ties;
-  if (setup.mode.mode == PreemptionMode::Os) setup.throttling = realtime_throttling();
-  for (std::string &warning : mode_warnings(workers, processors, setup.throttling)) {
+  const bool os = setup.mode.mode == PreemptionMode::Os;
+  for (std::string &warning : mode_warnings(workers, processors, os ? realtime_throttling() : std::nullopt)) {
     setup.warnings.push_back(std::move(warning));
   }
-  if (levels != nullptr && setup.mode.mode != PreemptionMode::Os) {
+  if (levels != nullptr && !os) {
     setup.warnings.push_back(fmt::format("{} has no effect, because the preemption is {} and not os", kLevelsVariable,
                                          to_string(setup.mode.mode)));
   }
@@ -173,9 +173,8 @@ std::vector<std::string> mode_warnings(std::uint32_t workers, std::size_t cpus,
   }
   if (throttling) {
     warnings.push_back(
-        fmt::format("real-time throttling is on: SCHED_FIFO threads get at most {} of every {} us of a busy processor; "
-                    "if some DAGs are of high criticality, the throttling affects only the other DAGs (turn it off "
-                    "with 'sysctl kernel.sched_rt_runtime_us=-1')",
+        fmt::format("real-time throttling is on: SCHED_FIFO threads get at most {} of every {} us of a busy processor "
+                    "(turn it off with 'sysctl kernel.sched_rt_runtime_us=-1')",
                     throttling->runtime_us, throttling->period_us));
   }
   return warnings;

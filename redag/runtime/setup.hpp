@@ -13,7 +13,7 @@
 #include "redag/base/result.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/runtime/executor_options.hpp"
-#include "redag/runtime/realtime_share.hpp"
+#include "redag/runtime/threads.hpp"
 #include "redag/sched/scheduler.hpp"
 
 namespace redag::runtime {
@@ -79,8 +79,7 @@ struct Setup {
   Mode mode;
   PriorityBand band;
   sched::Config config;
-  std::string order_folder;              // see EngineOptions
-  std::optional<Throttling> throttling;  // for threads at SCHED_FIFO with `os`
+  std::string order_folder;  // see EngineOptions
   std::vector<std::string> warnings;
 
   /// SCHED_FIFO priority of threads that must not wait for jobs, first of all the release timer; 0: none. Without `os`

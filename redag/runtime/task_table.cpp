@@ -33,8 +33,6 @@ void TaskTable::add(TaskId id, const Task &task, const TaskRole &role, Body &bod
   entry.body.swap(body);
   entry.listener = std::move(listener);
   entry.set_limits(task);
-  entry.is_high = role.is_high;
-  ++(role.is_high ? high_ : others_);
   entry.period = task.period;
   entry.deadline = task.deadline;
   if (role.is_sink && role.dag_deadline > 0) entry.dag_deadline = role.dag_deadline;
@@ -48,7 +46,6 @@ void TaskTable::add(TaskId id, const Task &task, const TaskRole &role, Body &bod
 void TaskTable::remove(TaskId id, std::vector<Body> &doomed) {
   REDAG_CHECK(id.value < entries_.size(), "removal of a task that does not exist");
   TaskEntry &entry = *entries_[id.value];
-  if (!entry.removed) --(entry.is_high ? high_ : others_);
   entry.removed = true;
   entry.listener.reset();
   if (entry.busy == 0) doomed.emplace_back().swap(entry.body);

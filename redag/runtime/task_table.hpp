@@ -20,7 +20,6 @@ namespace redag::runtime {
 /// What a task is within its DAG.
 struct TaskRole {
   DagId dag;
-  bool is_high = false;           // of a DAG of high criticality
   bool is_sink = false;           // the DAG answers with its finish
   bool has_predecessors = false;  // its jobs can carry data of earlier releases
   Duration dag_deadline = 0;      // end to end; 0: none
@@ -77,7 +76,6 @@ struct TaskEntry {
   Duration first_limit = kNever;  // next_limit() of a job that begins
   Duration least_limit = kNever;  // of wcet and budget; kNever: none
 
-  bool is_high = false;  // of a DAG of high criticality
   Usage usage;
   Duration period = 0;
   Duration deadline = 0;
@@ -129,15 +127,11 @@ class TaskTable {
   [[nodiscard]] std::size_t size() const { return entries_.size(); }
   /// How many jobs all tasks together can have in progress.
   [[nodiscard]] std::size_t most_started() const { return most_started_; }
-  /// Returns true if there are tasks to spare from throttling and others that can bear it.
-  [[nodiscard]] bool can_give_way() const { return high_ > 0 && others_ > 0; }
 
  private:
   bool measure_;
   std::vector<std::unique_ptr<TaskEntry>> entries_;  // entries keep their addresses
   std::size_t most_started_ = 0;
-  std::size_t high_ = 0;    // not removed, of DAGs of high criticality
-  std::size_t others_ = 0;  // not removed, of other DAGs
 };
 
 }  // namespace redag::runtime

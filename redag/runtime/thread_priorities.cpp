@@ -94,14 +94,12 @@ void ThreadPriorities::lower_raised(Predicate which) {
 }
 
 void ThreadPriorities::enter(Thread &thread) {
-  if (thread.of_job > 0) ++realtime_;
   if (thread.priority == thread.of_job) return exact_.add(thread.priority);
   thread.place = static_cast<std::uint32_t>(raised_.size());
   raised_.push_back(&thread);
 }
 
 void ThreadPriorities::leave(const Thread &thread) {
-  if (thread.of_job > 0) --realtime_;
   if (thread.priority == thread.of_job) return exact_.remove(thread.priority);
   raised_.back()->place = thread.place;
   raised_[thread.place] = raised_.back();

@@ -40,8 +40,6 @@ class ThreadPriorities {
   std::span<const Change> wait(std::size_t thread, int priority);
 
   [[nodiscard]] int of(std::size_t thread) const { return threads_[thread].priority; }
-  /// Returns true if a thread with a job has a real-time priority.
-  [[nodiscard]] bool any_realtime() const { return realtime_ > 0; }
 
  private:
   struct Thread {
@@ -98,8 +96,7 @@ class ThreadPriorities {
   std::vector<Change> changes_;
   std::size_t processors_ = 0;
   std::size_t started_ = 0;
-  std::size_t realtime_ = 0;  // started threads whose job asks for a real-time priority
-  bool unordered_ = false;    // a priority was kept although another job's lies in between
+  bool unordered_ = false;  // a priority was kept although another job's lies in between
 };
 
 /// A thread that is to get another priority.

@@ -19,7 +19,6 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
-#include "redag/runtime/realtime_share.hpp"
 
 namespace redag::runtime {
 
@@ -114,6 +113,12 @@ class ThreadStart {
 /// Locks the process's memory page by page as it is used (MCL_ONFAULT). Otherwise the stacks of many threads would all
 /// become resident. Error: RLIMIT_MEMLOCK, or no right.
 [[nodiscard]] Result<void> lock_memory();
+
+/// The kernel's setting: SCHED_FIFO threads may use `runtime_us` of each `period_us` of a processor.
+struct Throttling {
+  std::int64_t runtime_us = 0;
+  std::int64_t period_us = 0;
+};
 
 /// This kernel's setting. Empty: unlimited or unknown.
 [[nodiscard]] std::optional<Throttling> realtime_throttling();

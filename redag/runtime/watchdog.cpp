@@ -13,7 +13,7 @@
 namespace redag::runtime {
 namespace {
 
-thread_local const Watchdog *of_this_thread = nullptr;
+thread_local const Watchdog *watchdog_of_this_thread = nullptr;
 
 }  // namespace
 
@@ -23,7 +23,7 @@ Watchdog::Watchdog(Engine &engine, WatchdogOptions options, Report report)
   overdue_.reserve(engine.thread_count());  // watch() appends under the engine's lock
 }
 
-bool Watchdog::is_this_thread() const { return of_this_thread == this; }
+bool Watchdog::is_this_thread() const { return watchdog_of_this_thread == this; }
 
 void Watchdog::stop() {
   if (!thread_.joinable()) return;
@@ -43,7 +43,7 @@ void Watchdog::look(Time as_of) {
 }
 
 void Watchdog::main() noexcept {
-  of_this_thread = this;
+  watchdog_of_this_thread = this;
   while (!stop_.wait_until(monotonic_now() + options_.interval)) look(engine_.now());
 }
 

@@ -63,8 +63,6 @@ struct alignas(64) WorkerThread {
   std::uint64_t silent = 0;
   std::uint32_t level = 0;        // lock: of the job that it was given last; inherited only with `os`
   Duration used = 0;              // lock: processor time of the jobs that ended here
-  bool is_realtime = false;       // lock, throttled: had a job at real-time priority at the last look
-  bool is_spared = false;         // lock: its job does not give way to throttling
   Atomic<bool> outranked{false};  // written under the lock
   std::vector<Job> stack;         // lock: the jobs started here, the running one last
   trace::Ring events;             // Started and Executed; written by the thread

@@ -560,7 +560,6 @@ TEST(PriorityScheduler, TheLevelOfASuspendedJobIsTold) {
   for (const Dispatch &dispatch : step.dispatches) {
     EXPECT_EQ(dispatch.kind, DispatchKind::Level);
     EXPECT_EQ(dispatch.level, dispatch.job == slow ? 3U : 2U);
-    EXPECT_FALSE(dispatch.inherits);
   }
 }
 

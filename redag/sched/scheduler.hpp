@@ -85,7 +85,6 @@ struct Dispatch {
   WorkerId worker;
   JobSlot over;  // the job that loses the worker (Full) or is suspended under this one (Cooperative); invalid: none
   DispatchKind kind = DispatchKind::Start;
-  bool inherits = false;    // its level is that of a more urgent job that waits for it
   std::uint32_t level = 0;  // its priority level, 0 the most urgent; includes inherited priority
 };
 
@@ -169,7 +168,6 @@ class Scheduler {
   /// The DAG's tasks, first those it was added with, in its order. Includes removed tasks until their ids are used
   /// again. Valid until the next reconfiguration.
   [[nodiscard]] virtual std::span<const TaskId> tasks_of(DagId dag) const = 0;
-  [[nodiscard]] virtual Criticality criticality(DagId dag) const = 0;
   /// Ids in use are smaller than these numbers.
   [[nodiscard]] virtual std::size_t task_slots() const = 0;
   [[nodiscard]] virtual std::size_t dag_slots() const = 0;

@@ -102,7 +102,6 @@ class StepBuilder {
                              .worker = job.worker,
                              .over = over,
                              .kind = kind,
-                             .inherits = job.priority_of != job.task,
                              .level = level});
   }
 

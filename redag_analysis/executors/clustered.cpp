@@ -22,7 +22,6 @@ ClusteredScheduler::ClusteredScheduler(const Workload &workload, const Factory &
   for (const ClusterPart &part : parts_) schedulers_.push_back(make(part));
   std::size_t next_task = 0;
   for (const Dag &dag : workload.dags) {
-    criticalities_.push_back(dag.criticality);
     std::vector<TaskId> &tasks = tasks_of_.emplace_back();
     for (std::size_t i = 0; i < dag.tasks.size(); ++i) tasks.emplace_back(next_task++);
   }

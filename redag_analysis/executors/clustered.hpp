@@ -41,7 +41,6 @@ class ClusteredScheduler final : public sched::Scheduler {
   void set_timing(TaskId task, Duration period, Duration deadline, Time now) override;
   void close(Time now) override;
   [[nodiscard]] std::span<const TaskId> tasks_of(DagId dag) const override { return tasks_of_[dag.value]; }
-  [[nodiscard]] Criticality criticality(DagId dag) const override { return criticalities_[dag.value]; }
   [[nodiscard]] std::size_t task_slots() const override { return places_.size(); }
   [[nodiscard]] std::size_t dag_slots() const override { return tasks_of_.size(); }
   [[nodiscard]] sched::Accounting accounting(TaskId task) const override;
@@ -61,7 +60,6 @@ class ClusteredScheduler final : public sched::Scheduler {
   std::vector<TaskPlace> places_;
   std::vector<std::unique_ptr<sched::Scheduler>> schedulers_;
   std::vector<std::vector<TaskId>> tasks_of_;  // by DagId
-  std::vector<Criticality> criticalities_;     // by DagId
   std::vector<sched::Dispatch> dispatches_;    // of the last step, like the events
   std::vector<JobEvent> events_;
 };

@@ -37,17 +37,10 @@ void StartRules::ran(const LiveJob &job, Time at) {
   for (Unbegun &waiting : unbegun_) {
     if (waiting.overtaken != kNever || at - waiting.dispatched <= kLateStart) continue;
     const LiveJob *urgent = context_.replay.find(waiting.job.task, waiting.job.number);
-    if (urgent == nullptr || may_overtake(job, *urgent)) continue;
+    if (urgent == nullptr || !context_.replay.preempts(urgent->own, job.raised)) continue;
     waiting.overtaken = at;
     waiting.by = Replay::JobRef{job.task, job.number};
   }
-}
-
-// Jobs of lower criticality that bear the throttling are ordinary threads for a while.
-bool StartRules::may_overtake(const LiveJob &job, const LiveJob &waiting) const {
-  const Replay &replay = context_.replay;
-  const bool is_spared = !replay.is_degradable(job.task) && replay.is_degradable(waiting.task);
-  return is_spared || !replay.preempts(waiting.own, job.raised);
 }
 
 void StartRules::settle(const Replay::JobRef &job, Time begun) {

@@ -37,7 +37,6 @@ class StartRules {
   void ran(const LiveJob &job, Time at);
   void settle(const Replay::JobRef &job, Time begun);
   void judge(const Unbegun &job, Time begun);
-  [[nodiscard]] bool may_overtake(const LiveJob &job, const LiveJob &waiting) const;
 
   CheckContext &context_;
   std::vector<Unbegun> unbegun_;  // dispatched jobs whose body no thread has begun

@@ -91,19 +91,6 @@ TEST(CheckStart, AsUrgentOrMoreUrgentBodiesMayRun) {
   EXPECT_EQ(check_trace(shared).violated(Rule::Start), 0U);
 }
 
-// Under real-time throttling, jobs of lower criticality are ordinary threads for a while.
-TEST(CheckStart, JobsOfHighCriticalityMayGoFirst) {
-  Workload workload = two_rates();
-  workload.dags[1].criticality = Criticality::High;
-  TraceBuilder spared = both(workload);
-  spared.at(2 * kLate).finished("lo", 0, 1);
-  EXPECT_EQ(check_trace(on_threads(spared.until(3 * kLate))).violated(Rule::Start), 0U);
-  workload.dags[0].criticality = Criticality::High;
-  TraceBuilder alike = both(workload);
-  alike.at(2 * kLate).finished("lo", 0, 1);
-  expect_broken(on_threads(alike.until(3 * kLate)), Rule::Start);
-}
-
 TEST(CheckStart, WithoutPreemptionTheSystemDecidesWhichThreadRuns) {
   TraceBuilder t = both(two_rates(PreemptionMode::None));
   t.at(2 * kLate).finished("lo", 0, 1);

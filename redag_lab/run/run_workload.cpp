@@ -152,7 +152,6 @@ class Run {
     engine.config = setup->config;
     engine.band = setup->band;
     engine.order_folder = setup->order_folder;
-    engine.throttling = setup->throttling;
     engine.realtime_threads = options_.realtime_threads;
     engine.cpus = cpus;
     engine.trace_capacity = options_.trace_capacity;

@@ -130,7 +130,6 @@ std::unique_ptr<redag::runtime::Engine> ReDAGExecutor::Core::make_engine() {
   options.config.reuse_ids = options_.trace_capacity == 0;  // in a trace an id stands for one task
   options.band = setup_.band;
   options.order_folder = setup_.order_folder;
-  options.throttling = setup_.throttling;
   options.cpus = options_.cpus;
   options.spare_threads = options_.spare_threads;
   options.trace_capacity = options_.trace_capacity;

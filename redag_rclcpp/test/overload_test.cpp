@@ -14,7 +14,6 @@
 
 #include "mode_test.hpp"
 #include "rclcpp/rclcpp.hpp"
-#include "redag/runtime/threads.hpp"
 #include "spinning.hpp"
 #include "test_msgs/msg/basic_types.hpp"
 #include "test_msgs/srv/empty.hpp"
@@ -311,29 +310,6 @@ TEST_P(OverloadTest, LowerCriticalityGoesOnAfterHighModeOnWorkers) {
     ASSERT_TRUE(eventually(all_ended));
   }
   EXPECT_EQ(map.received.back(), 1'000'000);
-}
-
-// If the kernel throttles real-time threads, a long callback of lower criticality must leave the real-time class.
-TEST_P(OverloadTest, WhatIsNotOfHighCriticalityBearsTheThrottling) {
-  if (GetParam() != redag::PreemptionMode::Os || !redag::runtime::realtime_throttling()) {
-    GTEST_SKIP() << "nothing is throttled";
-  }
-  options.workload = parse(kTwoCriticalities);
-  ReDAGExecutor executor(options);
-  const auto own_priority = [] { return redag::runtime::fifo_priority(pthread_self()); };
-  std::atomic<bool> gave_way{false};
-  std::atomic<int> priority_of_control{0};
-  const auto map = subscribe("/map", [&] {
-    gave_way = eventually([&] { return own_priority() == 0; }, [] {});
-    eventually([&] { return priority_of_control > 0; }, [] {});
-  });
-  const auto control = subscribe("/control", [&] { priority_of_control = own_priority(); });
-  executor.add_node(node);
-  Spinner spinner(executor);
-  publisher("/map")->publish(Empty());
-  ASSERT_TRUE(eventually([&] { return gave_way.load(); }));
-  publisher("/control")->publish(Empty());
-  EXPECT_TRUE(eventually([&] { return priority_of_control > 0; }));
 }
 
 INSTANTIATE_TEST_SUITE_P(Modes, OverloadTest,

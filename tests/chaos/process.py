@@ -158,21 +158,6 @@ def fewer_processors(rng, folder):
     check_results(folder)
 
 
-# Ten times the load of its processor, with a DAG that must be spared.
-SPARED = """\
-name: spared
-platform: {workers: 1}
-policy: chain_aware
-dags:
-  - name: control
-    criticality: high
-    tasks: [{name: loop, wcet: 2ms, period: 10ms}]
-  - name: map
-    criticality: low
-    tasks: [{name: build, wcet: 200ms, period: 20ms}]
-"""
-
-
 def throttled(rng, folder):
     """More SCHED_FIFO work than one processor can do: the kernel pauses all real-time threads for a while."""
     file = folder / "random.yaml"
@@ -190,12 +175,6 @@ def throttled(rng, folder):
         raise Skipped("this kernel does not throttle; a processor would be taken from everybody")
     child = run("2500ms", "--out", folder / "out")
     expect(child.status == 0, child.err)
-    check_results(folder)
-
-    file.write_text(SPARED)
-    child = run("1500ms", "--out", folder / "spared")
-    expect(child.status == 0, child.err)
-    expect("jobs of lower criticality ran on ordinary threads for " in child.err, child.err)
     check_results(folder)
 
 

@@ -428,52 +428,6 @@ TEST(EngineStart, AThreadThatCannotBeHadEndsTheOthers) {
   });
 }
 
-// Real-time threads have no share left from the moment when the throttling guard first spins, at any point of a run.
-TEST(EngineShare, OnlyJobsOfLowerCriticalityAreOrdinaryThreads) {
-  int ordinary = 0;
-  int realtime = 0;
-  expect_holds([&] {
-    std::array<int, 16> priorities{};  // indexed by the explorer's threads
-    priorities.fill(1);
-    const testing::ObjectId object = explored::new_object();
-    runtime::on_set_priority = [&](std::uint32_t thread, int priority) {
-      explored::write(object, "set priority");
-      priorities.at(thread) = priority;
-    };
-    const auto is_realtime = [&] {
-      explored::read(object, "priority");
-      return priorities.at(explored::self()) > 0;
-    };
-    Workload workload = ladder(1);
-    workload.dags.push_back(ladder(1).dags[0]);
-    workload.dags[1].criticality = Criticality::High;
-    Countdown all(2);
-    Platform platform{Preemption::Full, 1, 2, false, 0};
-    // The guard looks only when it is woken.
-    platform.throttling = runtime::Throttling{0, explored::kForever / kMicrosecond + 1};
-    Machine machine(workload, platform,
-                    {[&](const Job &) {
-                       ++(is_realtime() ? realtime : ordinary);
-                       all.count();
-                       return Outcome::Finished;
-                     },
-                     [&](const Job &) {
-                       explored::check(is_realtime(), "a job of high criticality is an ordinary thread");
-                       all.count();
-                       return Outcome::Finished;
-                     }});
-    machine.start_calmly();
-    const std::uint32_t source = spawn([&] { machine.release(1); });
-    machine.release(0);
-    explored::join(source);
-    all.wait();
-    machine.finish_calmly();
-  });
-  runtime::on_set_priority = nullptr;
-  EXPECT_GT(ordinary, 0);
-  EXPECT_GT(realtime, 0);
-}
-
 // Two jobs are in progress when tasks above both are added: both get lower priorities. The more urgent one is the first
 // in the scheduler's tables.
 TEST(EngineProtocolLevels, NoPriorityIsInvertedWhileLevelsChange) {

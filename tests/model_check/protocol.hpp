@@ -127,8 +127,7 @@ struct Platform {
   std::uint32_t threads = 0;  // full preemption: jobs that can be in progress
   bool start_paused = false;
   std::size_t trace_capacity = 0;
-  std::uint32_t spins = 0;  // looks for a job before a thread sleeps
-  std::optional<runtime::Throttling> throttling = std::nullopt;
+  std::uint32_t spins = 0;          // looks for a job before a thread sleeps
   std::uint32_t spare_threads = 0;  // for jobs that block
 };
 
@@ -148,7 +147,6 @@ class Machine {
       options.config.levels = 8;
       options.band = runtime::PriorityBand{8, 9};
     }
-    options.throttling = platform.throttling;
     options.start_paused = platform.start_paused;
     options.trace_capacity = platform.trace_capacity;
     options.spins = platform.spins;

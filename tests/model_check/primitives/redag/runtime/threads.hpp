@@ -15,7 +15,6 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
-#include "redag/runtime/realtime_share.hpp"
 #include "redag_testing/explorer.hpp"
 
 namespace redag::runtime {
@@ -91,6 +90,10 @@ inline std::function<void(std::uint32_t thread, int priority)> on_set_priority;
 [[nodiscard]] inline int available_fifo_priority(int wanted) { return wanted; }
 [[nodiscard]] inline const char *realtime_hint() { return ""; }
 [[nodiscard]] inline Result<void> lock_memory() { return {}; }
+struct Throttling {
+  std::int64_t runtime_us = 0;
+  std::int64_t period_us = 0;
+};
 [[nodiscard]] inline std::optional<Throttling> realtime_throttling() { return std::nullopt; }
 
 }  // namespace redag::runtime
