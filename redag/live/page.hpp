@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The live page: the figures of a running executor for `redag top`, as bytes in shared memory. Owns the layout and its
-// version; writer.hpp and reader.hpp write and read it, and docs/live_page.md describes it. All values are
+// version; writer.hpp and reader.hpp write and read it. docs/live_page.md explains its use. All values are
 // native-endian; times and durations are int64 nanoseconds. A change of meaning needs a new version. Fields appended to
 // a row or a header do not, because their sizes are in the page. Plain values.
 #pragma once
@@ -171,7 +171,7 @@ inline constexpr bool kIsPlain = std::is_trivially_copyable_v<Row>&& std::is_sta
 static_assert(kIsPlain<Header> && kIsPlain<Figures> && kIsPlain<DagRow> && kIsPlain<TaskRow> && kIsPlain<FrameHeader>);
 static_assert(kIsPlain<Spread> && kIsPlain<ThreadRow> && kIsPlain<DeviceRow>);
 
-// Sizes and offsets as in docs/live_page.md.
+// Sizes and offsets of version 1, which readers of other programs rely on.
 static_assert(sizeof(Header) == 88 && offsetof(Header, page_size) == 32 && offsetof(Header, pid) == 56);
 static_assert(offsetof(Header, sequence) == 80);
 static_assert(sizeof(Figures) == 160 && offsetof(Figures, response_p50) == 64 && offsetof(Figures, active) == 144);
