@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 
 # Optimised builds check buffer sizes, guard stacks, mark the targets of indirect jumps, map relocations read-only, and
-# have no executable stack. docs/promises.md states the cost. Debug builds check the standard library's preconditions
-# instead. The sanitizers have memory checks of their own, which exclude both.
+# have no executable stack. docs/evidence/runtime_cost.md states the cost. Debug builds check the standard library's
+# preconditions instead. The sanitizers have memory checks of their own, which exclude both.
 if(NOT REDAG_SANITIZE)
   include(CheckPIESupported)
   check_pie_supported(LANGUAGES CXX)
