@@ -3,10 +3,12 @@
 
 // Measures jobs per second when there are always more ready jobs than workers. The result is the most that scheduling
 // costs, and shows whether throughput collapses with more workers than processors. Each of 64 tasks releases its next
-// job from its body. oneTBB, which runs its tasks in no order, is the reference.
+// job from its body. oneTBB, which runs its tasks in no order, is the reference. In a ring, each body releases the next
+// task and returns: a second worker has nothing to gain, and must not cost either.
 #include <benchmark/benchmark.h>
 #include <oneapi/tbb/task_arena.h>
 #include <pthread.h>
+#include <sys/resource.h>
 
 #include <atomic>
 #include <chrono>
@@ -87,6 +89,70 @@ BENCHMARK(BM_Engine)
     ->ArgsProduct({{1, 2, 4, 8, 16},
                    {static_cast<int>(PreemptionMode::None), static_cast<int>(PreemptionMode::Os)},
                    {0, 10}})
+    ->UseManualTime()
+    ->Iterations(1)
+    ->Unit(benchmark::kMillisecond);
+
+std::uint64_t context_switches() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::uint64_t>(usage.ru_nvcsw) + static_cast<std::uint64_t>(usage.ru_nivcsw);
+}
+
+// One message goes round. A ring of one task is a callback that may overlap itself, in a reentrant group.
+void BM_Ring(benchmark::State &state) {
+  const auto tasks = static_cast<std::uint32_t>(state.range(0));
+  const auto workers = static_cast<std::uint32_t>(state.range(1));
+  const auto wanted = static_cast<PreemptionMode>(state.range(2));
+  const Duration work = state.range(3) * kMicrosecond;
+  Result<Setup> setup = set_up({.preemption = wanted, .workers = workers});
+  if (!setup) return state.SkipWithError("this mode cannot be had here");
+  Workload workload;
+  workload.dags.emplace_back();
+  for (std::uint32_t t = 0; t < tasks; ++t) {
+    Task task;
+    task.period = task.deadline = task.wcet = kMillisecond;
+    task.concurrency = 2;
+    workload.dags[0].tasks.push_back(task);
+  }
+  std::uint64_t jobs = 0;
+  std::uint64_t switches = 0;
+  double seconds = 0;
+  for (auto _ : state) {
+    EngineOptions options;
+    options.config = setup->config;
+    options.band = setup->band;
+    Engine engine(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
+    std::atomic<std::uint64_t> done{0};
+    std::vector<Body> bodies(tasks, [&](const runtime::Job &job) {
+      spin_for(work);
+      done.fetch_add(1, std::memory_order_relaxed);
+      engine.release(TaskId((job.task.value + 1) % tasks), 0);
+      return sched::Outcome::Finished;
+    });
+    engine.bind(workload, std::move(bodies));
+    engine.set_origin(monotonic_now());
+    if (!engine.start()) return state.SkipWithError("threads cannot be started");
+    switches -= context_switches();
+    const Time begin = monotonic_now();
+    engine.release(TaskId(0), 0);
+    std::this_thread::sleep_for(kRun);
+    engine.halt();
+    (void)engine.wait_idle(kNever);
+    const Duration took = monotonic_now() - begin;
+    switches += context_switches();
+    engine.join();
+    jobs += done;
+    seconds += static_cast<double>(took) / kSecond;
+    state.SetIterationTime(static_cast<double>(took) / kSecond);
+  }
+  state.counters["jobs/s"] = static_cast<double>(jobs) / seconds;
+  state.counters["switches/job"] = static_cast<double>(switches) / static_cast<double>(jobs);
+}
+BENCHMARK(BM_Ring)
+    ->ArgNames({"tasks", "workers", "mode", "us"})
+    ->ArgsProduct(
+        {{1, 50}, {1, 2}, {static_cast<int>(PreemptionMode::None), static_cast<int>(PreemptionMode::Os)}, {0, 3}})
     ->UseManualTime()
     ->Iterations(1)
     ->Unit(benchmark::kMillisecond);

@@ -92,7 +92,7 @@ Result<void> Engine::start_threads(const std::vector<int> &cpus) {
   Result<void> started = pool_.start(setup, [this](WorkerThread &self) { main(self); });
   if (started && order_thread_) started = start_order();
   if (started && lookout_) {
-    started = start_helper(*lookout_, "lookout", 0, [this] { look_out(); });
+    started = start_helper(*lookout_, "lookout", os() ? options_.band.timer : 0, [this] { look_out(); });
   }
   return started;
 }
@@ -193,18 +193,18 @@ void Engine::look_out() noexcept {
 // ---- decisions ----
 
 // `taker` is the calling thread, or null if it cannot take a job.
-void Engine::decide(Locked &locked, Time now, Taker *taker) {
+void Engine::decide(Locked &locked, Time now, Taker *taker, Sender sender) {
   // While paused, only run_one() starts a job, on the caller's thread.
   const std::uint32_t for_caller = taker != nullptr && &taker->thread == &pool_.caller() ? 1 : 0;
-  carry_out(locked, scheduler_->dispatch(now, may_start() ? sched::kNoLimit : for_caller), now, taker);
+  carry_out(locked, scheduler_->dispatch(now, may_start() ? sched::kNoLimit : for_caller), now, taker, sender);
 }
 
 // Passes a step of the scheduler on to the threads.
-void Engine::carry_out(Locked &locked, const sched::Step &step, Time now, Taker *taker) {
+void Engine::carry_out(Locked &locked, const sched::Step &step, Time now, Taker *taker, Sender sender) {
   if (!step.events.empty()) report(locked, step.events);
   if (taker != nullptr || !step.dispatches.empty()) {
     const bool may_lead = releases_ != nullptr && releases_->expects();
-    placement_.place(step, Situation{now, locked.waited(), may_lead}, taker, tasks_, locked.wake_ups());
+    placement_.place(step, Situation{now, locked.waited(), may_lead, sender}, taker, tasks_, locked.wake_ups());
   }
   if (options_.config.preemption == sched::Preemption::Cooperative) refresh_outranked();
   if (waiting_.has_cancelled()) wake_cancelled(locked, now);
@@ -246,12 +246,23 @@ void Engine::release_at(std::span<const Release> releases, Time at) {
   Locked locked(*this, releases.size());
   withdraw_if_halting(locked);
   if (halted_at_ != kNever) return;
+  const Sender sender = note_release(at);
   do {
     const auto lot = releases.first(std::min(releases.size(), sched::kMostReleasesAtOnce));
     for (const Release &release : lot) scheduler_->release(release.task, release.nominal, at, release.origin);
-    decide(locked, at);
+    decide(locked, at, nullptr, sender);
     releases = releases.subspan(lot.size());
   } while (!releases.empty());
+}
+
+// Notes when the calling job first releases another. Returns its thread if it is expected to end soon and then takes a
+// job: one that has a job below does not.
+Sender Engine::note_release(Time at) {
+  RunningJob *const job = RunningJob::current();
+  if (job == nullptr || job->engine != this || job->below != nullptr) return nullptr;
+  job->released = std::min(job->released, at);
+  const bool soon = job->thread < pool_.size() && tasks_[job->task].releases_at_end();
+  return soon ? &pool_[job->thread] : nullptr;
 }
 
 void Engine::miss(std::span<const Release> releases, Reason reason) {

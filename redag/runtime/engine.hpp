@@ -311,8 +311,10 @@ class Engine {
 
   void report_limits(RunningJob &job, Duration used, Time now) REDAG_REQUIRES(lock_);
   bool tell_limits(RunningJob &job, Duration used, Time now, bool from_outside) REDAG_REQUIRES(lock_);
-  void decide(Locked &locked, Time now, Taker *taker = nullptr) REDAG_REQUIRES(lock_);
-  void carry_out(Locked &locked, const sched::Step &step, Time now, Taker *taker) REDAG_REQUIRES(lock_);
+  void decide(Locked &locked, Time now, Taker *taker = nullptr, Sender sender = nullptr) REDAG_REQUIRES(lock_);
+  void carry_out(Locked &locked, const sched::Step &step, Time now, Taker *taker, Sender sender = nullptr)
+      REDAG_REQUIRES(lock_);
+  Sender note_release(Time at) REDAG_REQUIRES(lock_);
   void report(Locked &locked, std::span<const JobEvent> events) REDAG_REQUIRES(lock_);
   void refresh_outranked() REDAG_REQUIRES(lock_);
   void register_task(TaskId id, const Task &task, const TaskRole &role, Body &body,
@@ -336,7 +338,9 @@ class Engine {
 
   [[nodiscard]] bool os() const { return options_.config.preemption == sched::Preemption::Full; }
   [[nodiscard]] bool realtime() const { return os() || options_.realtime_threads; }
-  [[nodiscard]] bool posts_silently() const { return !realtime() && options_.config.workers > 1; }
+  [[nodiscard]] bool posts_silently() const {
+    return (os() || !options_.realtime_threads) && options_.config.workers > 1;
+  }
 
   EngineOptions options_;
   mutable PiMutex lock_;

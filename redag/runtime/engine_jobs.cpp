@@ -83,7 +83,7 @@ void Engine::run(Taker &taker, Time at) noexcept {
   running.before = running.earlier = 0;
   running.waiting = nullptr;
   running.wait = nullptr;
-  running.ended = kNever;
+  running.ended = running.released = kNever;
   if (self.meter.needs_reading(at, !assignment.expected_short)) {
     self.meter.set(thread_cpu_now(), at);
     at = now();
@@ -142,6 +142,7 @@ inline Outcome Engine::call(const Assignment &assignment, RunningJob &running) {
     Locked locked(*this, &delayed);
     withdraw_if_halting(locked);
     entry.count(running.charged, running.earlier + at - running.here_since);
+    if (running.released != kNever) entry.count_tail(at - running.released);
     self.used += running.charged - running.before;
     if (finished && response > entry.deadline) count_late(job, entry, at);
     if (finished && end_to_end > entry.dag_deadline) ++entry.late_end_to_end;

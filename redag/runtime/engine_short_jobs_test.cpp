@@ -34,11 +34,11 @@ class ShortJobs : public ::testing::TestWithParam<PreemptionMode> {
   }
   static PreemptionMode mode() { return GetParam(); }
 
-  void start(std::vector<Body> bodies) {
+  void start(std::vector<Body> bodies, std::uint32_t workers = 1) {
     Workload workload = redag::testing::ladder(bodies.size());
     for (Task &task : workload.dags[0].tasks) task.priority = -*task.priority;
     EngineOptions options;
-    options.config = make_config(Mode{mode(), {}}, 1, workload.policy, band_, 4);
+    options.config = make_config(Mode{mode(), {}}, workers, workload.policy, band_, 4);
     options.band = band_;
     engine_ = std::make_unique<Engine>(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
     engine_->bind(workload, std::move(bodies));
@@ -106,6 +106,36 @@ TEST_P(ShortJobs, AJobIsNotChargedForTheOneBefore) {
   EXPECT_GE(engine_->usage(TaskId(0)).longest, 20 * kMillisecond);
   EXPECT_GE(engine_->usage(TaskId(1)).longest, 100 * kMicrosecond);
   EXPECT_LT(engine_->usage(TaskId(1)).longest, 10 * kMillisecond);
+}
+
+// What a body releases shortly before its end is left to its own thread. If it goes on all the same, another worker
+// takes the job meanwhile.
+TEST_P(ShortJobs, WhatAJobReleasesStartsBesideItIfItGoesOn) {
+  int left = 2000;
+  std::atomic<std::int64_t> latest{-1};
+  std::atomic<bool> seen{false};
+  std::atomic<bool> ended{false};
+  const auto release = [&](std::size_t task) { engine_->release(TaskId(task), engine_->now()); };
+  const auto first = [&](const Job &) {
+    release(1);
+    if (--left > 0) {
+      release(0);
+      return Outcome::Finished;
+    }
+    const auto last = static_cast<std::int64_t>(engine_->accounting(TaskId(1)).released) - 1;
+    for (int ms = 0; ms < 10'000 && latest < last; ++ms) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    seen = latest == last;
+    ended = true;
+    return Outcome::Finished;
+  };
+  const auto second = [&](const Job &job) {
+    latest = static_cast<std::int64_t>(job.number);
+    return Outcome::Finished;
+  };
+  start({first, second}, 2);
+  release(0);
+  while (!ended) std::this_thread::yield();
+  EXPECT_TRUE(seen);
 }
 
 // Only `os` changes priorities.

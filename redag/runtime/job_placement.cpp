@@ -19,7 +19,7 @@ JobPlacement::JobPlacement(WorkerPool &pool, WaitingJobs &waiting, bool os, cons
       os_(os),
       band_(band),
       priorities_(os ? pool.size() : 0, band.top_job),
-      mailboxes_(pool.size(), lookout),
+      mailboxes_(pool.size(), lookout, !os),
       spare_(spare),
       of_leader_(band_.timer) {
   moves_.reserve(os ? pool.size() : 0);
@@ -66,10 +66,13 @@ void JobPlacement::place(const sched::Step &step, const Situation &situation, Ta
     // caller would have to wait for a longer job, although another processor may be idle.
     const bool preempts = os_ && taker == nullptr && entry.expected_short();
     const int here = preempts ? processor_of(this_threads_processor()) : -1;
-    mailboxes_.post(entry, situation.now, here, wake_ups, [&](WorkerThread &thread) {
-      assign(thread, dispatch, entry, thread.mail);
-      set_priority_for_job(thread, thread.mail);
-    });
+    // A job more urgent than the sender's starts at once.
+    const bool may_wait = situation.sender != nullptr && situation.sender->level <= dispatch.level;
+    mailboxes_.post(entry, situation.now, here, may_wait ? situation.sender : nullptr, wake_ups,
+                    [&](WorkerThread &thread) {
+                      assign(thread, dispatch, entry, thread.mail);
+                      set_priority_for_job(thread, thread.mail);
+                    });
   }
   mailboxes_.settle(wake_ups);
 }

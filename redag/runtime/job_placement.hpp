@@ -44,11 +44,13 @@ struct Situation {
   Time now = 0;           // when it was taken
   bool waited = false;    // the calling thread waited for the engine's lock
   bool may_lead = false;  // releases are expected: an idle thread can wait for them
+  Sender sender = nullptr;
 };
 
 class JobPlacement {
  public:
-  /// os: the kernel schedules the threads by their priorities in `band`. For `lookout` see Mailboxes.
+  /// os: the kernel schedules the threads by their priorities in `band`. For `lookout` see Mailboxes; `os` leaves
+  /// tiny jobs to their own threads.
   /// `spare`: how many threads there are besides those that can have jobs with a worker.
   JobPlacement(WorkerPool &pool, WaitingJobs &waiting, bool os, const PriorityBand &band, Parker *lookout,
                std::uint32_t spare);
@@ -64,8 +66,9 @@ class JobPlacement {
   bool hand_over(Taker &taker, const sched::Step &step, TaskTable &tasks, bool waited) {
     if (step.dispatches.size() != 1 || taker.below.valid() || &taker.thread == &pool_.caller()) return false;
     const sched::Dispatch &next = step.dispatches.front();
-    // With `os` a thread that has a job of its own steals none.
-    if (next.kind != sched::DispatchKind::Start || !(os_ || mailboxes_.all_empty())) return false;
+    // With `os` a thread that has a job of its own steals none, but silent mail has to wake its thread.
+    const bool has_mail = os_ ? mailboxes_.any_silent() : !mailboxes_.all_empty();
+    if (next.kind != sched::DispatchKind::Start || has_mail) return false;
     WorkerThread &self = taker.thread;
     TaskEntry &entry = tasks[next.task];
     mailboxes_.end(self);

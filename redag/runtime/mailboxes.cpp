@@ -17,18 +17,22 @@ bool is_before(const WorkerThread &a, const WorkerThread &b) {
 
 }  // namespace
 
-Mailboxes::Mailboxes(std::size_t threads, Parker *lookout) : lookout_(lookout) {
+Mailboxes::Mailboxes(std::size_t threads, Parker *lookout, bool silences_tiny_jobs)
+    : lookout_(lookout), silences_tiny_jobs_(silences_tiny_jobs) {
   idle_.reserve(threads);
   handed_.reserve(threads);
 }
 
-bool Mailboxes::may_be_silent(const TaskEntry &entry, Time now, WakeUps &wake_ups) {
-  if (in_tiny_jobs_ == 0 || !entry.expected_tiny()) return false;
-  if (looks_) return true;
-  if (now - std::exchange(last_wake_up_, now) >= kBusy) return false;
-  looks_ = true;
-  seen_ = silent_posts_;
-  wake_ups.wake_helper(*lookout_);
+bool Mailboxes::may_be_silent(const TaskEntry &entry, Time now, Sender sender, WakeUps &wake_ups) {
+  const bool tiny = silences_tiny_jobs_ && look_soon_ > 0 && entry.expected_tiny();
+  if (sender == nullptr && !tiny) return false;
+  if (!looks_) {
+    if (now - std::exchange(last_wake_up_, now) >= kBusy) return false;
+    looks_ = true;
+    seen_ = silent_posts_;
+    wake_ups.wake_helper(*lookout_);
+  }
+  if (sender != nullptr) look_soon(*sender);
   return true;
 }
 

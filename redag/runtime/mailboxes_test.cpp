@@ -11,16 +11,17 @@ namespace {
 // Threads that were never started: what they are told stays in their parkers.
 class MailboxesTest : public ::testing::Test {
  protected:
-  explicit MailboxesTest(std::uint32_t threads = 4) : pool_(threads, 0), mailboxes_(threads, &lookout_) {
+  explicit MailboxesTest(std::uint32_t threads = 4) : pool_(threads, 0), mailboxes_(threads, &lookout_, true) {
     for (std::uint32_t t = threads; t-- > 0;) mailboxes_.add_idle(pool_[t]);
     for (int i = 0; i < 8; ++i) tiny_.count(0, TaskEntry::kTiny);
     for (int i = 0; i < 8; ++i) other_.count(0, TaskEntry::kTiny + 1);
   }
 
   /// Returns the thread that has got the job.
-  WorkerThread &post(const TaskEntry &entry, std::uint32_t level = 0, Time now = 0, int here = -1) {
+  WorkerThread &post(const TaskEntry &entry, std::uint32_t level = 0, Time now = 0, int here = -1,
+                     Sender sender = nullptr) {
     WorkerThread *got = nullptr;
-    mailboxes_.post(entry, now, here, wake_ups_, [&](WorkerThread &thread) {
+    mailboxes_.post(entry, now, here, sender, wake_ups_, [&](WorkerThread &thread) {
       thread.level = level;
       got = &thread;
     });
@@ -102,6 +103,21 @@ TEST_F(MailboxesTest, TinyJobsArePostedSilentlyWhileOneRunsAndWakeUpsAreFrequent
   EXPECT_TRUE(was_woken(post(other_, 0, kMillisecond + kMicrosecond))) << "it is no tiny job";
 }
 
+TEST_F(MailboxesTest, WhatAJobReleasesShortlyBeforeItsEndIsLeftToItsThread) {
+  take(post(other_, 0, 0, -1, &running_));
+  WorkerThread &silent = post(other_, 7, kMicrosecond, -1, &running_);
+  EXPECT_FALSE(was_woken(silent));
+  EXPECT_TRUE(was_woken(lookout_)) << "the job can take longer than expected";
+  EXPECT_TRUE(mailboxes_.any_silent());
+  mailboxes_.settle(wake_ups_);
+  EXPECT_FALSE(was_woken(silent)) << "the sender looks for it";
+  WorkerThread &other = post(other_, 8, kMicrosecond, -1, &running_);
+  mailboxes_.end(running_);
+  EXPECT_EQ(mailboxes_.steal(sched::kNoLimit), &silent);
+  mailboxes_.settle(wake_ups_);
+  EXPECT_TRUE(was_woken(other)) << "the sender has a job again";
+}
+
 TEST_F(MailboxesTest, NothingIsSilentWhileNoTinyJobRuns) {
   make_busy();
   mailboxes_.end(running_);
@@ -175,6 +191,21 @@ TEST_F(MailboxesTest, WithoutATinyJobAllSilentMailWakesItsThread) {
   mailboxes_.settle(wake_ups_);
   EXPECT_TRUE(was_woken(first));
   EXPECT_TRUE(was_woken(second));
+}
+
+TEST(TaskEntry, ReleasesAtItsEndIfItsTailsAreMostlyShort) {
+  TaskEntry entry;
+  for (int i = 0; i < 4; ++i) entry.count_tail(CpuMeter::kShort);
+  EXPECT_FALSE(entry.releases_at_end());
+  for (int i = 0; i < 4; ++i) entry.count_tail(CpuMeter::kShort);
+  EXPECT_TRUE(entry.releases_at_end());
+  entry.count_tail(CpuMeter::kShort + 1);
+  EXPECT_FALSE(entry.releases_at_end());
+  entry.count_tail(CpuMeter::kShort);
+  EXPECT_TRUE(entry.releases_at_end()) << "it was an exception";
+  for (int i = 0; i < 2; ++i) entry.count_tail(CpuMeter::kShort + 1);
+  for (int i = 0; i < 3; ++i) entry.count_tail(CpuMeter::kShort);
+  EXPECT_FALSE(entry.releases_at_end());
 }
 
 TEST(TaskEntry, AQuarterOfItsJobsMakesTheNextOneExpectedToBeTiny) {

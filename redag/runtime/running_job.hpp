@@ -51,6 +51,7 @@ struct RunningJob {
   CpuMeter::Start start;       // of its stretch since then; excludes jobs that ran on top
   Duration before = 0;         // processor time until then
   Duration earlier = 0;        // how long it was in progress on threads until then
+  Time released = kNever;      // when its body first released a job; kNever: it has not
   bool measured = false;       // its processor time is asked for, however short it was
   bool used_wcet_low = false;  // reported to the scheduler; written under the engine's lock
   bool used_budget = false;

@@ -56,6 +56,14 @@ struct TaskEntry {
   /// Returns true if more than a quarter of its last jobs were tiny: where threads compete for the engine's lock, tiny
   /// jobs that release others often take longer.
   [[nodiscard]] bool expected_tiny() const { return tiny_score > kMostTinyScore / 3; }
+  /// Returns true if its last jobs that released others from their bodies mostly ended within kShort after the first
+  /// release. Two in a row that did not are enough for false.
+  [[nodiscard]] bool releases_at_end() const { return tail_score > kStreak / 2; }
+  /// Counts a job whose body released another job `tail` before it ended.
+  void count_tail(Duration tail) {
+    const std::uint32_t loss = std::min(tail_score, kStreak / 2);
+    tail_score = tail <= CpuMeter::kShort ? std::min(tail_score + 1, kStreak) : tail_score - loss;
+  }
 
   /// Returns true if a job that has been in progress for `elapsed` is overdue.
   [[nodiscard]] bool is_overdue(Duration elapsed, const WatchLimits &limits) const {
@@ -96,6 +104,7 @@ struct TaskEntry {
   std::uint32_t away = 0;         // of these, jobs that wait without a worker
   std::uint32_t short_jobs = 0;   // consecutive short jobs up to now; at most kStreak
   std::uint32_t tiny_score = 0;   // a tiny job adds 3, another one takes 1
+  std::uint32_t tail_score = 0;   // a short tail (count_tail()) adds 1, another one takes 4; at most kStreak
   bool removed = false;
   bool waits_end = false;  // it was removed, and its jobs no longer wait
 

@@ -58,7 +58,7 @@ struct alignas(64) WorkerThread {
   bool yields = false;          // lock: a job on another thread has preempted its job
   bool led = false;             // used by the thread only: the release thread leaves releases to it
   bool is_handed = false;       // lock: is in JobPlacement::handed_
-  bool in_tiny_job = false;     // lock: its job is expected to be tiny, and it looks for others' mail afterwards
+  bool looks_soon = false;      // lock: its job is expected to end soon, and it looks for others' mail afterwards
   // lock: a number if its mail did not wake it, and 0 otherwise. Larger numbers are later.
   std::uint64_t silent = 0;
   std::uint32_t level = 0;        // lock: of the job that it was given last; inherited only with `os`
