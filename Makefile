@@ -51,6 +51,7 @@ instructions: ## instructions of a job in scheduler and engine, counted by valgr
 lint: ## layers, references, commits, module diagram, formatting, locks, and clang-tidy on files that differ from the main branch
 	@tools/bootstrap lint
 	tools/check_layers
+	tools/check_size
 	tools/check_prose
 	tools/check_spdx
 	tools/check_references
