@@ -3,10 +3,9 @@
 
 // Hands jobs to threads that have none. Such a job is the thread's mail. Waking the thread takes longer than many jobs:
 // a thread that is awake and needs a job therefore steals mail. Mail need not even wake its thread while another thread
-// is about to end its job, because that one soon looks for mail. Such mail is silent. There are two kinds: a tiny job,
-// while another one is in progress, and a job that the body of a job releases shortly before it ends (Sender). A thread
-// of its own, the lookout, looks every kLookInterval for mail that has waited for a whole interval, and has its thread
-// woken.
+// is about to end its job, because that one soon looks for mail. Such mail is silent: of a tiny job, while another one
+// is in progress, and of a job that a body releases shortly before its end (Sender). A thread of its own, the lookout,
+// looks every kLookInterval for mail that has waited for a whole interval, and has its thread woken.
 //
 // Invariant: while mail is silent, the lookout is awake. Nothing here allocates. Not thread-safe: the engine's lock
 // guards it.
