@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cstdlib>
 #include <utility>
 
@@ -24,9 +23,8 @@ constexpr int kUserRoom = 9;
 constexpr std::uint32_t kSpareThreads = 16;
 
 /// Says why the executor cannot share its order with others; empty: it can.
-std::string obstacle_to_sharing(const Mode &mode, PolicyKind policy, bool has_levels) {
+std::string obstacle_to_sharing(const Mode &mode, PolicyKind policy) {
   if (mode.mode != PreemptionMode::Os) return fmt::format("the preemption is {} and not os", to_string(mode.mode));
-  if (has_levels) return fmt::format("{} gives the levels", kLevelsVariable);
   if (!rate_of(policy, 1, 1)) return fmt::format("policy {} does not order by periods", to_string(policy));
   return {};
 }
@@ -45,33 +43,6 @@ int PriorityBand::of_releases() const {
 }
 
 PriorityBand probe_priority_band() { return band_up_to(available_fifo_priority(kHighestPriority)); }
-
-Result<PriorityBand> with_levels(PriorityBand band, const std::string &text) {
-  band.given.clear();
-  const char *at = text.data();
-  const char *const end = at + text.size();
-  while (at != end) {
-    int priority = 0;
-    const auto [next, error] = std::from_chars(at, end, priority);
-    const bool descends = priority >= 2 && (band.given.empty() || priority <= band.given.back());
-    if (error != std::errc() || !descends || (next != end && (*next != ',' || next + 1 == end))) {
-      return make_error(fmt::format("{} is {}, which is no list of priorities from the highest to 2 at least",
-                                    kLevelsVariable, in_quotes(text)),
-                        "take it from 'redag arrange ROBOT --levels PROCESS', such as 80,78,77");
-    }
-    band.given.push_back(priority);
-    at = next == end ? end : next + 1;
-  }
-  if (band.given.empty() || band.top_job == 0) return band;
-  if (band.given.front() >= band.timer) {
-    return make_error(fmt::format("{} asks for priority {}, and this process can have at most {} for jobs",
-                                  kLevelsVariable, band.given.front(), band.timer - 1),
-                      "raise its limit (rtprio), or plan with 'redag arrange --rtprio'");
-  }
-  band.top_job = band.given.front();
-  band.shared = true;
-  return band;
-}
 
 Result<std::string> order_folder(bool wanted, const char *value) {
   const std::string text = value == nullptr ? "" : value;
@@ -131,16 +102,10 @@ Result<Setup> set_up(const SetupRequest &request) {
   Result<Mode> mode = resolve_mode(request.preemption, request.policy, setup.band);
   if (!mode) return tl::unexpected(mode.error());
   setup.mode = *std::move(mode);
-  const char *const levels = std::getenv(kLevelsVariable);
-  if (levels != nullptr && setup.mode.mode == PreemptionMode::Os) {
-    Result<PriorityBand> band = with_levels(setup.band, levels);
-    if (!band) return tl::unexpected(band.error());
-    setup.band = *std::move(band);
-  }
   Result<std::string> folder = order_folder(request.share_order, std::getenv(kShareOrderVariable));
   if (!folder) return tl::unexpected(folder.error());
   if (!folder->empty()) {
-    const std::string obstacle = obstacle_to_sharing(setup.mode, request.policy, levels != nullptr);
+    const std::string obstacle = obstacle_to_sharing(setup.mode, request.policy);
     if (obstacle.empty()) {
       setup.order_folder = *std::move(folder);
       setup.band.shared = true;
@@ -156,10 +121,6 @@ Result<Setup> set_up(const SetupRequest &request) {
   const bool os = setup.mode.mode == PreemptionMode::Os;
   for (std::string &warning : mode_warnings(workers, processors, os ? realtime_throttling() : std::nullopt)) {
     setup.warnings.push_back(std::move(warning));
-  }
-  if (levels != nullptr && !os) {
-    setup.warnings.push_back(fmt::format("{} has no effect, because the preemption is {} and not os", kLevelsVariable,
-                                         to_string(setup.mode.mode)));
   }
   return setup;
 }

@@ -23,7 +23,7 @@ namespace redag::runtime {
 struct PriorityBand {
   int top_job = 0;  // 0: the process has no real-time rights
   int timer = 0;
-  // By level, from REDAG_LEVELS: priorities in an order of several processes. Empty: all of them, one for each level.
+  // By level: priorities in an order of several processes. Empty: all of them, one for each level.
   std::vector<int> given = {};
   bool shared = false;  // jobs of other processes have priorities among these
 
@@ -50,10 +50,6 @@ inline constexpr int kHighestPriority = 90;
 /// Finds the priorities that the process may use, by trying them.
 [[nodiscard]] PriorityBand probe_priority_band();
 
-/// The variable of the environment with the priorities of an executor's levels, most urgent first ("80,78,77"). `redag
-/// arrange` computes them for executors that share a machine (docs/robot.md).
-inline constexpr const char *kLevelsVariable = "REDAG_LEVELS";
-
 /// The variable that lets the executors of a process share one order with those of other processes (docs/robot.md):
 /// `1`, `0`, or the folder of their pages.
 inline constexpr const char *kShareOrderVariable = "REDAG_SHARE_ORDER";
@@ -61,10 +57,6 @@ inline constexpr const char *kShareOrderVariable = "REDAG_SHARE_ORDER";
 /// Returns the folder of the pages of executors that share an order, for a value of REDAG_SHARE_ORDER; null: not set.
 /// Empty: no order is shared. Error: the value is none of those that the variable can have.
 [[nodiscard]] Result<std::string> order_folder(bool wanted, const char *value);
-
-/// Returns `band` with the priorities that `text` gives to its levels. Error: `text` is no list of descending
-/// priorities from 2, or they are not below the timer of the band.
-[[nodiscard]] Result<PriorityBand> with_levels(PriorityBand band, const std::string &text);
 
 /// `auto` becomes `os` where `band` and the policy allow it, else `cooperative`. Error: `os` was asked for and is not
 /// available.

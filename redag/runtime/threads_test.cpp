@@ -248,9 +248,14 @@ TEST(ResolveMode, TheMostUrgentLevelHasTheTopPriorityAndTheLastOneIsValid) {
 
 TEST(PriorityBand, ReleasesComeAfterMoreUrgentJobsOfOthers) {
   EXPECT_EQ(kBand.of_releases(), 90);
-  EXPECT_EQ(with_levels(kBand, "80,70")->of_releases(), 90) << "its own jobs are the most urgent ones";
-  EXPECT_EQ(with_levels(kBand, "79,70")->of_releases(), 80);
-  EXPECT_EQ(with_levels(kBand, "2")->of_releases(), 3);
+  const auto with_levels = [](std::vector<int> priorities) {
+    PriorityBand band = kBand;
+    band.given = std::move(priorities);
+    return band;
+  };
+  EXPECT_EQ(with_levels({80, 70}).of_releases(), 90) << "its own jobs are the most urgent ones";
+  EXPECT_EQ(with_levels({79, 70}).of_releases(), 80);
+  EXPECT_EQ(with_levels({2}).of_releases(), 3);
 }
 
 TEST(Setup, TheTimerOutranksWorkersThatInheritAPriority) {

@@ -23,9 +23,7 @@ struct Responses {
   std::vector<std::optional<Duration>> dags;   // by DagId, from the release of the source on
 };
 
-// `fill` writes the responses of each CPU set's tasks and DAGs.
-template <class Fill>
-Result<Responses> collect(const Workload &workload, const analysis::AnalysisPlatform &platform, Fill fill) {
+Result<Responses> bounds_of(const Workload &workload, const analysis::AnalysisPlatform &platform) {
   Responses responses;
   responses.tasks.resize(workload.task_count());
   responses.dags.resize(workload.dags.size());
@@ -33,25 +31,11 @@ Result<Responses> collect(const Workload &workload, const analysis::AnalysisPlat
     if (part.workload.dags.empty()) continue;
     const Result<analysis::TaskSet> task_set = analysis::compile(part.workload, analysis::platform_of(platform, part));
     if (!task_set) return tl::unexpected<Diagnostics>(task_set.error());
-    fill(part, *task_set, responses);
+    const analysis::Report report = analysis::analyze(*task_set);
+    for (std::size_t t = 0; t < part.tasks.size(); ++t) responses.tasks[part.tasks[t].value] = report.tasks[t].response;
+    for (std::size_t d = 0; d < part.dags.size(); ++d) responses.dags[part.dags[d].value] = report.dags[d].response;
   }
   return responses;
-}
-
-// By the bounds.
-void fill_bounds(const ClusterPart &part, const analysis::TaskSet &task_set, Responses &responses) {
-  const analysis::Report report = analysis::analyze(task_set);
-  for (std::size_t t = 0; t < part.tasks.size(); ++t) responses.tasks[part.tasks[t].value] = report.tasks[t].response;
-  for (std::size_t d = 0; d < part.dags.size(); ++d) responses.dags[part.dags[d].value] = report.dags[d].response;
-}
-
-// Of a schedule that keeps all deadlines.
-void fill_deadlines(const ClusterPart &part, const analysis::TaskSet &task_set, Responses &responses) {
-  for (const analysis::Unit &unit : task_set.units) {
-    const Duration due = std::min(unit.deadline, unit.limit);
-    for (const std::uint32_t t : unit.tasks) responses.tasks[part.tasks[t].value] = due;
-    if (task_set.dags[unit.dag.value].units.size() == 1) responses.dags[part.dags[unit.dag.value].value] = due;
-  }
 }
 
 // A link in the union.
@@ -82,8 +66,8 @@ class Iteration {
     }
   }
 
-  /// Raises each jitter to what the bounds ask for. Returns true if one changed. `remedy`: for data that are too late.
-  Result<bool> step(const Responses &responses, const char *remedy) {
+  /// Raises each jitter to what the bounds ask for. Returns true if one changed.
+  Result<bool> step(const Responses &responses) {
     bool changed = false;
     Diagnostics mistakes;
     for (const Crossing &crossing : crossings_) {
@@ -99,7 +83,7 @@ class Iteration {
             fmt::format("data of '{}' can arrive {} after the release behind them, which is more than their period {}",
                         crossing.link.from.name, humanize_duration(*response + crossing.link.transport),
                         format_duration(crossing.to.period)),
-            remedy));
+            "lower the load, or the rate"));
       } else if (const Duration jitter = *response + crossing.link.transport; jitter > crossing.to.jitter) {
         crossing.to.jitter = jitter;
         changed = true;
@@ -137,26 +121,13 @@ Result<void> set_jitter_of_links(const Robot &robot, const std::vector<std::size
   if (robot.links.empty()) return {};
   Iteration iteration(robot, first_task, united);
   for (int round = 0; round < kMostRounds; ++round) {
-    const Result<Responses> responses = collect(united, platform, fill_bounds);
+    const Result<Responses> responses = bounds_of(united, platform);
     if (!responses) return tl::unexpected<Diagnostics>(responses.error());
-    const Result<bool> changed = iteration.step(*responses, "lower the load, or the rate");
+    const Result<bool> changed = iteration.step(*responses);
     if (!changed) return tl::unexpected<Diagnostics>(changed.error());
     if (!*changed) return {};
   }
   return tl::unexpected<Diagnostics>(iteration.no_fixed_point());
-}
-
-Result<void> set_jitter_by_deadlines(const Robot &robot, const std::vector<std::size_t> &first_task,
-                                     const analysis::AnalysisPlatform &platform, Workload &united) {
-  if (robot.links.empty()) return {};
-  const Result<Responses> deadlines = collect(united, platform, fill_deadlines);
-  if (!deadlines) return tl::unexpected<Diagnostics>(deadlines.error());
-  const Result<bool> changed = Iteration(robot, first_task, united)
-                                   .step(*deadlines,
-                                         "policy audsley counts with the deadline of the sender: state one that is "
-                                         "shorter by the transport than the period");
-  if (!changed) return tl::unexpected<Diagnostics>(changed.error());
-  return {};
 }
 
 }  // namespace redag::robot

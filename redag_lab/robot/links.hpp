@@ -21,9 +21,4 @@ namespace redag::robot {
 [[nodiscard]] Result<void> set_jitter_of_links(const Robot &robot, const std::vector<std::size_t> &first_task,
                                                const analysis::AnalysisPlatform &platform, Workload &united);
 
-/// The same with the deadlines of what sends for its bounds: the jitter in every order that keeps all deadlines is no
-/// larger. Errors, each at its link: nothing can bound `from`; its deadline and `transport` are more than the period.
-[[nodiscard]] Result<void> set_jitter_by_deadlines(const Robot &robot, const std::vector<std::size_t> &first_task,
-                                                   const analysis::AnalysisPlatform &platform, Workload &united);
-
 }  // namespace redag::robot

@@ -7,24 +7,15 @@
 
 namespace redag::robot {
 
-const char *policy_name(const Robot &robot) { return robot.by_bounds ? kAudsley : to_string(robot.policy); }
-
-PolicyKind own_policy(const Robot &robot, std::size_t process) {
-  const std::optional<Workload> &workload = robot.processes[process].workload;
-  return robot.by_bounds && workload ? workload->policy : robot.policy;
-}
-
 bool is_of_threads(const Robot &robot, std::size_t process, TaskId task) {
   return std::any_of(robot.threads.begin(), robot.threads.end(), [&](const Threads &threads) {
-    return threads.level && threads.level->kind == Level::Kind::Task && threads.level->task.process == process &&
-           threads.level->task.task == task;
+    return threads.level.kind == Level::Kind::Task && threads.level.task.process == process &&
+           threads.level.task.task == task;
   });
 }
 
 bool has_executor(const Robot &robot, std::size_t process) {
-  const std::optional<Workload> &workload = robot.processes[process].workload;
-  if (!workload) return false;
-  for (std::size_t t = 0; t < workload->task_count(); ++t) {
+  for (std::size_t t = 0; t < robot.processes[process].workload.task_count(); ++t) {
     if (!is_of_threads(robot, process, TaskId(t))) return true;
   }
   return false;

@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The bounds of the union against what really runs: a scheduler for each process, which knows only its own jobs, and a
-// kernel below them, which runs the m most urgent started jobs of all processes. A process learns of a release when the
-// kernel runs its thread for releases, which takes no time. Virtual time, tick by tick.
+// The bounds of the union against what really runs: a scheduler for each process, which knows only its own jobs and has
+// its priorities from the order that all share (runtime::CommonOrder), and a kernel below them, which runs the m most
+// urgent started jobs of all processes. A process learns of a release when the kernel runs its thread for releases,
+// which takes no time. Virtual time, tick by tick.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -14,11 +15,10 @@
 #include <utility>
 #include <vector>
 
+#include "redag/runtime/common_order.hpp"
+#include "redag/runtime/setup.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
-#include "redag_lab/robot/assigned_order.hpp"
-#include "redag_lab/robot/order.hpp"
-#include "redag_lab/robot/plan.hpp"
 #include "redag_lab/robot/union.hpp"
 #include "redag_testing/bound_property.hpp"
 #include "redag_testing/builders.hpp"
@@ -211,8 +211,8 @@ bool is_linked(const Robot &robot, std::size_t process, TaskId task) {
 
 // Simulates the processes, and compares each response with the bound of the task in the union. `lowered`: how far the
 // threads for releases are below their priority.
-Observed observe(const Robot &robot, const Plan &plan, const analysis::Report &report, std::size_t cpus,
-                 std::uint64_t seed, int lowered = 0) {
+Observed observe(const Robot &robot, const std::vector<runtime::PriorityBand> &bands, const analysis::Report &report,
+                 std::size_t cpus, std::uint64_t seed, int lowered = 0) {
   Rng rng(seed);
   std::deque<SimulatedProcess> processes;  // which cannot be moved
   struct Timer {
@@ -229,8 +229,8 @@ Observed observe(const Robot &robot, const Plan &plan, const analysis::Report &r
   std::size_t tasks = 0;
   Duration longest = 0;
   for (std::size_t p = 0; p < robot.processes.size(); ++p) {
-    const Workload &workload = *robot.processes[p].workload;
-    const auto band = runtime::with_levels(plan.band, levels_text(plan.of_executor[p])).value();
+    const Workload &workload = robot.processes[p].workload;
+    const runtime::PriorityBand &band = bands[p];
     const auto workers = static_cast<std::uint32_t>(cpus) + testing::between(rng, 0, 2);
     const Ties ties = testing::chance(rng, 0.5) ? Ties::Share : Ties::Fixed;
     processes.emplace_back(workload, band, workers, ties);
@@ -334,7 +334,7 @@ void add_receiver(Rng &rng, Robot &robot) {
   std::uint32_t next_task = 0;
   const std::size_t receiver = robot.processes.size();
   for (std::size_t p = 0; p < receiver; ++p) {
-    const Workload &workload = *robot.processes[p].workload;
+    const Workload &workload = robot.processes[p].workload;
     for (const TaskRef &ref : flatten(workload)) {
       const std::vector<Task> &siblings = workload.dags[ref.dag.value].tasks;
       const auto timers = std::count_if(siblings.begin(), siblings.end(),
@@ -362,16 +362,34 @@ void add_receiver(Rng &rng, Robot &robot) {
   robot.processes.push_back(std::move(process));
 }
 
-// Bounds and order of a robot, for priorities up to `limit`.
+// The priorities that the executors of the processes have when they agree, by level.
+std::vector<runtime::PriorityBand> bands_of(const Robot &robot, const runtime::PriorityBand &alone) {
+  std::vector<live::OrderStatement> statements;
+  for (const Process &process : robot.processes) {
+    live::OrderStatement &statement = statements.emplace_back();
+    statement.top_job = alone.top_job;
+    for (const TaskRef &ref : flatten(process.workload)) statement.rates.push_back(ref.task->period);
+    runtime::make_statable(statement.rates);
+  }
+  const runtime::CommonOrder order(statements);
+  std::vector<runtime::PriorityBand> bands;
+  for (const live::OrderStatement &statement : statements) {
+    runtime::PriorityBand &band = bands.emplace_back(alone);
+    for (const Duration rate : statement.rates) band.given.push_back(order.priority_of(rate));
+  }
+  return bands;
+}
+
+// The bounds of a robot, and the priorities of its executors.
 struct Analysed {
-  Plan plan;
+  std::vector<runtime::PriorityBand> bands;
   analysis::Report report;
 };
 
-Analysed analysed(const Robot &robot, int limit) {
-  Plan plan = plan_of(robot, runtime::band_up_to(limit)).value();
-  const LoadedWorkload united = union_of(robot, plan.band.levels()).value();
-  return Analysed{std::move(plan), analysis::analyze(testing::compiled(united.workload))};
+Analysed analysed(const Robot &robot) {
+  const LoadedWorkload united = union_of(robot).value();
+  return Analysed{bands_of(robot, runtime::band_up_to(runtime::kHighestPriority)),
+                  analysis::analyze(testing::compiled(united.workload))};
 }
 
 TEST(RobotUnionBounds, HoldForSchedulersAboveOneKernel) {
@@ -381,10 +399,10 @@ TEST(RobotUnionBounds, HoldForSchedulersAboveOneKernel) {
   for (std::uint64_t seed = 1; seed <= count; ++seed) {
     Rng rng(seed);
     const Robot robot = random_robot(rng, testing::chance(rng, 0.3) ? std::vector{0} : std::vector{0, 1});
-    const auto [plan, report] = analysed(robot, testing::chance(rng, 0.8) ? 90 : 5);
+    const auto [bands, report] = analysed(robot);
     bounded += std::any_of(report.tasks.begin(), report.tasks.end(), [](const auto &each) { return each.response; });
     for (std::uint64_t run = 0; run < 3; ++run) {
-      const Observed observed = observe(robot, plan, report, robot.cpu_sets[0].cpus.size(), seed * 1000 + run);
+      const Observed observed = observe(robot, bands, report, robot.cpu_sets[0].cpus.size(), seed * 1000 + run);
       jobs += observed.jobs;
       ASSERT_EQ(observed.violation, "") << "seed " << seed << ", run " << run;
     }
@@ -400,10 +418,11 @@ TEST(RobotUnionBounds, HoldWithGroupsOnOneProcessor) {
   for (std::uint64_t seed = 1; seed <= count; ++seed) {
     Rng rng(seed);
     const Robot robot = random_robot(rng, {0}, 0.5, 1);
-    const auto [plan, report] = analysed(robot, 90);
+    const auto [bands, report] = analysed(robot);
     bounded += std::any_of(report.tasks.begin(), report.tasks.end(), [](const auto &each) { return each.response; });
     for (std::uint64_t run = 0; run < 3; ++run) {
-      ASSERT_EQ(observe(robot, plan, report, 1, seed * 1000 + run).violation, "") << "seed " << seed << ", run " << run;
+      ASSERT_EQ(observe(robot, bands, report, 1, seed * 1000 + run).violation, "")
+          << "seed " << seed << ", run " << run;
     }
   }
   EXPECT_GT(bounded, count / 2);
@@ -426,34 +445,9 @@ TEST(RobotUnionBounds, CountEachHolderThatRunsForAMoreUrgentJob) {
                        tick_dag("control", {{.name = "c", .period = 8 * kTick, .wcet = kTick, .group = "bus"}})}));
   robot.processes.push_back(
       process("camera", {tick_dag("images", {{.name = "d", .period = 17 * kTick, .wcet = 7 * kTick}})}));
-  const analysis::Tightest bound = analysed(robot, 90).report.tasks.back();
+  const analysis::Tightest bound = analysed(robot).report.tasks.back();
   ASSERT_TRUE(bound.response);
   EXPECT_GE(*bound.response, 12 * kTick);
-}
-
-// An order in which rates of one process can come before shorter ones of another.
-TEST(RobotUnionBounds, HoldInAnOrderByTheBounds) {
-  std::uint64_t robots = 0;
-  std::uint64_t inverted = 0;
-  const std::uint64_t count = testing::how_many(200);
-  for (std::uint64_t seed = 1; seed <= count; ++seed) {
-    Rng rng(seed);
-    Robot robot = random_robot(rng, testing::chance(rng, 0.3) ? std::vector{0} : std::vector{0, 1});
-    const std::vector<std::vector<std::uint32_t>> by_rate = order_of(robot, 0).of_task;
-    robot.by_bounds = true;
-    Result<OrderSearch> search = search_order(robot);
-    if (!search) continue;  // groups on two processors
-    robot.assigned = std::move(search->order);
-    ++robots;
-    inverted += order_of(robot, 0).of_task != by_rate ? 1U : 0U;
-    const auto [plan, report] = analysed(robot, testing::chance(rng, 0.8) ? 90 : 5);
-    for (std::uint64_t run = 0; run < 3; ++run) {
-      const Observed observed = observe(robot, plan, report, robot.cpu_sets[0].cpus.size(), seed * 1000 + run);
-      ASSERT_EQ(observed.violation, "") << "seed " << seed << ", run " << run;
-    }
-  }
-  EXPECT_GT(robots, count / 3);
-  EXPECT_GT(inverted, robots / 10);
 }
 
 // Data that cross to another process, and its bounds from the release behind them on.
@@ -465,11 +459,11 @@ TEST(RobotUnionBounds, HoldForDataOfOtherProcesses) {
     Rng rng(seed);
     Robot robot = random_robot(rng, testing::chance(rng, 0.3) ? std::vector{0} : std::vector{0, 1}, kLoadWithLinks);
     add_receiver(rng, robot);
-    if (robot.links.empty() || !union_of(robot, 79)) continue;  // too much load for the links
+    if (robot.links.empty() || !union_of(robot)) continue;  // too much load for the links
     ++robots;
-    const auto [plan, report] = analysed(robot, 90);
+    const auto [bands, report] = analysed(robot);
     for (std::uint64_t run = 0; run < 3; ++run) {
-      const Observed observed = observe(robot, plan, report, robot.cpu_sets[0].cpus.size(), seed * 1000 + run);
+      const Observed observed = observe(robot, bands, report, robot.cpu_sets[0].cpus.size(), seed * 1000 + run);
       crossed += observed.crossed;
       ASSERT_EQ(observed.violation, "") << "seed " << seed << ", run " << run;
     }
@@ -487,11 +481,11 @@ TEST(RobotUnionBounds, BreakWhereDataAreTakenToBeThere) {
     Rng rng(seed);
     Robot robot = random_robot(rng, {0, 1}, kLoadWithLinks);
     add_receiver(rng, robot);
-    if (robot.links.empty() || !union_of(robot, 79)) continue;
+    if (robot.links.empty() || !union_of(robot)) continue;
     Robot without = robot;
     without.links.clear();
-    const Analysed analysed_without = analysed(without, 90);
-    if (!observe(robot, analysed_without.plan, analysed_without.report, 2, seed).violation.empty()) ++violations;
+    const Analysed analysed_without = analysed(without);
+    if (!observe(robot, analysed_without.bands, analysed_without.report, 2, seed).violation.empty()) ++violations;
   }
   EXPECT_GT(violations, 5U);
 }
@@ -501,7 +495,7 @@ Robot with_modes(Rng &rng) {
   Robot robot = random_robot(rng, {0}, 0.8, 0);
   for (Process &process : robot.processes) {
     if (testing::chance(rng, 0.4)) continue;
-    for (Dag &dag : process.workload->dags) {
+    for (Dag &dag : process.workload.dags) {
       if (testing::chance(rng, 0.5)) {
         dag.degrade.kind = testing::chance(rng, 0.5) ? Degrade::Kind::Stop : Degrade::Kind::Skip;
         continue;
@@ -524,10 +518,10 @@ TEST(RobotUnionBounds, HoldWhereProcessesHaveHiModesOfTheirOwn) {
   for (std::uint64_t seed = 1; seed <= count; ++seed) {
     Rng rng(seed);
     const Robot robot = with_modes(rng);
-    const auto [plan, report] = analysed(robot, 90);
+    const auto [bands, report] = analysed(robot);
     bounded += std::any_of(report.tasks.begin(), report.tasks.end(), [](const auto &each) { return each.response; });
     for (std::uint64_t run = 0; run < 3; ++run) {
-      const Observed observed = observe(robot, plan, report, 1, seed * 1000 + run);
+      const Observed observed = observe(robot, bands, report, 1, seed * 1000 + run);
       high_modes += observed.high_modes;
       ASSERT_EQ(observed.violation, "") << "seed " << seed << ", run " << run;
     }
@@ -550,7 +544,7 @@ TEST(RobotUnionBounds, CountAllWorkOfProcessesThatDoNotLearnOfHiMode) {
     process.name = dag.name;
     process.workload = testing::make_workload({dag}, 1, PreemptionMode::Os);
   }
-  const analysis::Report report = analysed(robot, 90).report;
+  const analysis::Report report = analysed(robot).report;
   // 5 of its own and three jobs of 3; the other process is bounded in every mode, too.
   EXPECT_EQ(report.tasks[0].response, 14 * kTick);
   EXPECT_EQ(report.tasks[1].response, 3 * kTick);
@@ -562,8 +556,8 @@ TEST(RobotUnionBounds, BreakWhereReleasesAreLessUrgentThanJobs) {
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     Rng rng(seed);
     const Robot robot = random_robot(rng, {0, 1});
-    const auto [plan, report] = analysed(robot, 90);
-    if (!observe(robot, plan, report, 2, seed, 90).violation.empty()) ++violations;
+    const auto [bands, report] = analysed(robot);
+    if (!observe(robot, bands, report, 2, seed, 90).violation.empty()) ++violations;
   }
   EXPECT_GT(violations, 10U);
 }
@@ -574,8 +568,8 @@ TEST(RobotUnionBounds, BreakWithFewerProcessors) {
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     Rng rng(seed);
     const Robot robot = random_robot(rng, {0, 1});
-    const auto [plan, report] = analysed(robot, 90);
-    if (!observe(robot, plan, report, 1, seed).violation.empty()) ++violations;
+    const auto [bands, report] = analysed(robot);
+    if (!observe(robot, bands, report, 1, seed).violation.empty()) ++violations;
   }
   EXPECT_GT(violations, 10U);
 }

@@ -6,12 +6,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <map>
 #include <utility>
+#include <vector>
 
 #include "redag/model/validate.hpp"
+#include "redag/runtime/setup.hpp"
+#include "redag/sched/policy.hpp"
 #include "redag_lab/robot/links.hpp"
-#include "redag_lab/robot/order.hpp"
 #include "redag_lab/robot/reservation.hpp"
 
 namespace redag::robot {
@@ -25,32 +26,66 @@ constexpr const char *kThreads = "threads";
 constexpr int kAbove = -1;
 constexpr int kReserved = -2;
 
+// One order of all tasks, and of threads that have the rate of tasks. Tasks that the policy ranks equal share a level.
+struct Order {
+  std::vector<int> of_task;     // by TaskId of all processes, one after the other; 0 is the most urgent level
+  std::vector<int> of_threads;  // by entry; meaningless without a rate
+  std::uint32_t levels = 0;
+};
+
+Order order_of(const Robot &robot) {
+  std::vector<sched::RankedTask> ranked;
+  std::uint32_t first_dag = 0;
+  for (const Process &process : robot.processes) {
+    for (const TaskRef &ref : flatten(process.workload)) {
+      ranked.push_back(sched::RankedTask{.period = ref.task->period,
+                                         .deadline = ref.task->deadline,
+                                         .priority = ref.task->priority.value_or(0),
+                                         .dag = first_dag + ref.dag.value,
+                                         .task = TaskId(ranked.size())});
+    }
+    first_dag += static_cast<std::uint32_t>(process.workload.dags.size());
+  }
+  const std::size_t tasks = ranked.size();
+  for (const Threads &threads : robot.threads) {
+    const Duration rate = threads.level.rate;
+    if (threads.level.kind != Level::Kind::Rate) continue;
+    ranked.push_back(
+        sched::RankedTask{.period = rate, .deadline = rate, .dag = first_dag++, .task = TaskId(ranked.size())});
+  }
+  Order order;
+  for (const sched::Priority &priority : sched::assign_priorities(ranked, robot.policy, Ties::Share)) {
+    order.of_task.push_back(static_cast<int>(priority.tier));
+    order.levels = std::max(order.levels, priority.tier + 1);
+  }
+  auto next = order.of_task.begin() + static_cast<std::ptrdiff_t>(tasks);
+  for (const Threads &threads : robot.threads) {
+    order.of_threads.push_back(threads.level.kind == Level::Kind::Rate ? *next++ : 0);
+  }
+  order.of_task.resize(tasks);
+  return order;
+}
+
 class Union {
  public:
-  Union(const Robot &robot, std::uint32_t levels) : robot_(robot), order_(order_of(robot, levels)) {
+  explicit Union(const Robot &robot) : robot_(robot), order_(order_of(robot)) {
     workload_.name = robot.name;
     workload_.policy = robot.policy;
     workload_.platform.preemption = PreemptionMode::Os;
   }
 
-  Result<United> run(LoadOptions options) {
-    first_of_threads_.resize(robot_.threads.size());
+  Result<LoadedWorkload> run(LoadOptions options) {
+    check_levels();
     for (std::size_t p = 0; p < robot_.processes.size(); ++p) add_process(p);
     for (std::size_t t = 0; t < robot_.threads.size(); ++t) add_threads(t);
-    if (mistakes_.empty() && workload_.dags.empty()) {
-      mistakes_.push_back(
-          Diagnostic{Severity::Error, {}, 0, 0, "no process of the robot has a workload", "add 'workload:' to one"});
-    }
     if (!mistakes_.empty()) return tl::unexpected<Diagnostics>(std::move(mistakes_));
     set_platform();
     set_phases();
-    if (order_.is_merged() || has_above_ || robot_.by_bounds) fix_priorities();
+    if (has_own_order_) fix_priorities();
     Diagnostics found = validate(workload_, options);
     if (has_errors(found)) return tl::unexpected<Diagnostics>(std::move(found));
-    std::vector<bool> is_above;
-    for (const int level : levels_) is_above.push_back(level < 0);
-    return United{std::move(workload_), std::move(found), std::move(first_task_), std::move(first_of_threads_),
-                  std::move(is_above)};
+    if (const Result<void> linked = add_links(); !linked) return tl::unexpected<Diagnostics>(linked.error());
+    return LoadedWorkload{std::move(workload_), std::move(found), true};
   }
 
  private:
@@ -58,19 +93,27 @@ class Union {
     mistakes_.push_back(Diagnostic{Severity::Error, at.file, at.line, at.column, std::move(message), std::move(hint)});
   }
 
+  // Executors with too few levels merge their own first, and then those of all.
+  void check_levels() {
+    const std::uint32_t most = runtime::band_up_to(runtime::kHighestPriority).levels();
+    if (order_.levels <= most) return;
+    refuse(robot_.processes.front().place,
+           fmt::format("the robot has {} different rates, and executors tell {} apart", order_.levels, most),
+           "give similar tasks one rate");
+  }
+
   void add_process(std::size_t p) {
     const Process &process = robot_.processes[p];
     first_task_.push_back(levels_.size());
-    if (!process.workload) return;
     check_executor(p);
     // More threads than processors: a job of the process can be started beside a more urgent one.
-    const bool has_more_threads = process.workload->platform.workers > robot_.cpu_sets[process.cpu_set].cpus.size();
+    const bool has_more_threads = process.workload.platform.workers > robot_.cpu_sets[process.cpu_set].cpus.size();
     starters_ += process.states_workers && has_more_threads ? 2 : 1;
     if (process.name == kThreads) {
       refuse(process.place, "the name 'threads' of a process is that of all threads in the union",
              "choose another name");
     }
-    for (const Dag &original : process.workload->dags) {
+    for (const Dag &original : process.workload.dags) {
       Dag &dag = workload_.dags.emplace_back(original);
       dag.name = joined(process.name, dag.name);
       dag.cluster = {};
@@ -80,7 +123,8 @@ class Union {
       }
       set_of_dag_.push_back(process.cpu_set);
     }
-    levels_.insert(levels_.end(), order_.of_task[p].begin(), order_.of_task[p].end());
+    const auto first = order_.of_task.begin() + static_cast<std::ptrdiff_t>(levels_.size());
+    levels_.insert(levels_.end(), first, first + static_cast<std::ptrdiff_t>(process.workload.task_count()));
     ++next_executor_;
   }
 
@@ -92,8 +136,7 @@ class Union {
     }
     const std::vector<TaskRef> refs = flatten(workload_);
     for (std::size_t p = 0; p < robot_.processes.size(); ++p) {
-      const std::size_t count = robot_.processes[p].workload ? robot_.processes[p].workload->task_count() : 0;
-      for (std::size_t t = 0; t < count; ++t) {
+      for (std::size_t t = 0; t < robot_.processes[p].workload.task_count(); ++t) {
         Task &task = *tasks[first_task_[p] + t];
         const bool is_source = task.activation == Activation::Timer && task.predecessors.empty();
         if (is_source && task.phase == Phase::Common && is_of_threads(robot_, p, TaskId(t)))
@@ -125,21 +168,24 @@ class Union {
   // Within its process, an executor decides which jobs the kernel gets to choose from.
   void check_executor(std::size_t p) {
     const Process &process = robot_.processes[p];
-    const Workload &workload = *process.workload;
+    const Workload &workload = process.workload;
     if (!workload.platform.clusters.empty()) {
       refuse(process.place, fmt::format("process '{}' has clusters of its own", process.name),
              "make each cluster a process, and its processors a CPU set");
       return;
     }
     if (!has_executor(robot_, p)) return;
-    if (robot_.by_bounds) {
-      check_own_order(process);
-    } else if (workload.policy != robot_.policy) {
+    if (workload.policy != robot_.policy) {
       refuse(process.place,
              fmt::format("process '{}' orders its jobs by {}, and the robot by {}", process.name,
                          to_string(workload.policy), to_string(robot_.policy)),
              fmt::format("write 'policy: {}' in the workload of the process, or change the robot's",
                          to_string(robot_.policy)));
+    }
+    if (robot_.policy == PolicyKind::Fixed && executors_++ > 0) {
+      refuse(process.place,
+             "executors with policy fixed share no order: their priorities have no meaning for each other",
+             "order the robot by rate_monotonic or deadline_monotonic");
     }
     const PreemptionMode preemption = workload.platform.preemption;
     if (preemption != PreemptionMode::Os && preemption != PreemptionMode::Auto) {
@@ -160,51 +206,25 @@ class Union {
     }
   }
 
-  // In an order by the bounds, a process keeps its own order of its own levels.
-  void check_own_order(const Process &process) {
-    const PolicyKind policy = process.workload->policy;
-    if (policy == PolicyKind::RateMonotonic || policy == PolicyKind::DeadlineMonotonic || policy == PolicyKind::Fixed) {
-      return;
-    }
-    refuse(process.place,
-           fmt::format("process '{}' orders its jobs by {}, which has no levels that could have a place among those of "
-                       "other processes",
-                       process.name, to_string(policy)),
-           "write 'policy: rate_monotonic', deadline_monotonic or fixed in its workload");
-  }
-
   void add_threads(std::size_t t) {
     const Threads &threads = robot_.threads[t];
-    if (!threads.level) return;
-    if (threads.level->kind == Level::Kind::Task) {
-      check_alone(threads);
-      const Process &process = robot_.processes[threads.level->task.process];
-      if (threads.cpus.empty() || threads.cpus == robot_.cpu_sets[process.cpu_set].cpus) return;
-      refuse(threads.place,
-             fmt::format("threads '{}' execute a task of process '{}', but on other processors than it has",
-                         threads.name, process.name),
-             "remove 'cpus:' of the threads");
-      return;
-    }
-    if (!threads.level->interferes()) return;
-    const std::optional<std::size_t> set = set_of(threads);
-    if (!set) return;
-    if (threads.level->kind == Level::Kind::Reservation) return add_reserved(t, *set);
-    if (threads.wcet == 0) {
-      refuse(threads.place, fmt::format("threads '{}' can delay tasks, and nothing says for how long", threads.name),
-             "add 'wcet:' and 'period:': what one of them executes at most, and how often; or use a level below");
-      return;
-    }
     Task task;
     task.wcet = threads.wcet;
     task.period = task.deadline = threads.period;
-    add_interference(t, *set, task, order_.of_threads[t] ? static_cast<int>(*order_.of_threads[t]) : kAbove);
+    switch (threads.level.kind) {
+      case Level::Kind::Task: return check_alone(threads);
+      case Level::Kind::Reservation: return add_reserved(threads);
+      case Level::Kind::Above: return add_interference(threads, task, kAbove);
+      case Level::Kind::Rate: break;
+    }
+    has_own_order_ = has_own_order_ || threads.period != threads.level.rate;
+    add_interference(threads, task, order_.of_threads[t]);
   }
 
   // Only an executor keeps what a task shares with others.
   void check_alone(const Threads &threads) {
-    const TaskOf &of = threads.level->task;
-    const Workload &workload = *robot_.processes[of.process].workload;
+    const TaskOf &of = threads.level.task;
+    const Workload &workload = robot_.processes[of.process].workload;
     const TaskRef ref = flatten(workload)[of.task.value];
     const Dag &dag = workload.dags[ref.dag.value];
     const bool has_successor = std::any_of(dag.tasks.begin(), dag.tasks.end(), [&](const Task &task) {
@@ -222,30 +242,34 @@ class Union {
   }
 
   // The bound for one of them assumes that it has a processor whenever the kernel lets it run.
-  void add_reserved(std::size_t t, std::size_t set) {
-    const Threads &threads = robot_.threads[t];
-    const std::size_t reserved = reserved_[set] += threads.count;
-    const std::size_t cpus = robot_.cpu_sets[set].cpus.size();
-    if (reserved > cpus) {
+  void add_reserved(const Threads &threads) {
+    if (robot_.cpu_sets.size() > 1) {
+      refuse(
+          threads.place,
+          fmt::format("threads '{}' have a reservation, which the kernel gives only for all processors", threads.name),
+          "give the robot 'cpus' instead of 'cpu_sets'");
+      return;
+    }
+    reserved_ += threads.count;
+    const std::size_t cpus = robot_.cpu_sets.front().cpus.size();
+    if (reserved_ > cpus) {
       refuse(threads.place,
              fmt::format("{} threads have reservations, and there are {} processors: they can delay each other, which "
                          "no bound covers",
-                         reserved, cpus),
+                         reserved_, cpus),
              "give fewer threads a reservation");
       return;
     }
-    const ReservedLoad load = load_of(threads.level->reservation);
+    const ReservedLoad load = load_of(threads.level.reservation);
     Task task;
     task.wcet = load.wcet;
     task.period = task.deadline = load.period;
     task.jitter = load.jitter;
-    add_interference(t, set, task, kReserved);
+    add_interference(threads, task, kReserved);
   }
 
   // Adds a DAG with `count` such tasks.
-  void add_interference(std::size_t t, std::size_t set, Task task, int level) {
-    const Threads &threads = robot_.threads[t];
-    first_of_threads_[t] = levels_.size();
+  void add_interference(const Threads &threads, Task task, int level) {
     Dag &dag = workload_.dags.emplace_back();
     dag.name = joined(kThreads, threads.name);
     dag.is_foreign = true;
@@ -256,29 +280,8 @@ class Union {
       dag.tasks.push_back(task);
       levels_.push_back(level);
     }
-    has_above_ = has_above_ || level < 0;
-    set_of_dag_.push_back(set);
-  }
-
-  // Returns the CPU set where these threads run; nothing if no task runs where they do, or after a refusal.
-  std::optional<std::size_t> set_of(const Threads &threads) {
-    std::vector<std::size_t> met;
-    for (std::size_t s = 0; s < robot_.cpu_sets.size(); ++s) {
-      const std::vector<int> &cpus = robot_.cpu_sets[s].cpus;
-      const bool meets = threads.cpus.empty() || std::any_of(cpus.begin(), cpus.end(), [&](int cpu) {
-                           return std::binary_search(threads.cpus.begin(), threads.cpus.end(), cpu);
-                         });
-      if (meets) met.push_back(s);
-    }
-    if (met.empty()) return std::nullopt;
-    const std::vector<int> &cpus = robot_.cpu_sets[met.front()].cpus;
-    if (met.size() == 1 && (threads.cpus.empty() || threads.cpus == cpus)) return met.front();
-    refuse(threads.place,
-           fmt::format("threads '{}' can delay tasks, and their processors are not those of one CPU set", threads.name),
-           threads.level->kind == Level::Kind::Reservation
-               ? "a reservation is for all processors: give the robot 'cpus' instead of 'cpu_sets'"
-               : "give them the 'cpus:' of one CPU set, or processors of none");
-    return std::nullopt;
+    has_own_order_ = has_own_order_ || level < 0;
+    set_of_dag_.push_back(threads.cpu_set);
   }
 
   // One CPU set with tasks is the platform; several are its clusters.
@@ -310,6 +313,15 @@ class Union {
     }
   }
 
+  // Data of other processes come late. Nothing bounds them before all wcets are measured.
+  Result<void> add_links() {
+    const std::vector<TaskRef> tasks = flatten(workload_);
+    const bool is_measured =
+        std::all_of(tasks.begin(), tasks.end(), [](const TaskRef &ref) { return ref.task->wcet > 0; });
+    if (!is_measured) return {};
+    return set_jitter_of_links(robot_, first_task_, analysis::platform_of(workload_), workload_);
+  }
+
   const Robot &robot_;
   Order order_;
   Workload workload_;
@@ -317,26 +329,15 @@ class Union {
   std::vector<std::size_t> set_of_dag_;
   std::vector<int> levels_;              // by TaskId of the union
   std::vector<std::size_t> first_task_;  // by process: the first of its tasks in the union
-  std::vector<std::optional<std::size_t>> first_of_threads_;
-  std::map<std::size_t, std::size_t> reserved_;  // by CPU set: threads with reservations
+  std::size_t reserved_ = 0;             // threads with reservations
   std::uint32_t next_executor_ = 0;
-  std::size_t starters_ = 0;  // what starts jobs without knowing of the others
-  bool has_above_ = false;    // some task is above all levels of the order
+  std::size_t starters_ = 0;    // what starts jobs without knowing of the others
+  std::size_t executors_ = 0;   // that have been checked, with policy fixed
+  bool has_own_order_ = false;  // some task's level does not follow from its period or deadline
 };
 
 }  // namespace
 
-Result<United> unite(const Robot &robot, std::uint32_t levels, LoadOptions options) {
-  return Union(robot, levels).run(options);
-}
-
-Result<LoadedWorkload> union_of(const Robot &robot, std::uint32_t levels, LoadOptions options) {
-  Result<United> united = unite(robot, levels, options);
-  if (!united) return tl::unexpected<Diagnostics>(std::move(united.error()));
-  Workload &workload = united->workload;
-  const Result<void> linked = set_jitter_of_links(robot, united->first_task, analysis::platform_of(workload), workload);
-  if (!linked) return tl::unexpected<Diagnostics>(linked.error());
-  return LoadedWorkload{std::move(workload), std::move(united->warnings), true};
-}
+Result<LoadedWorkload> union_of(const Robot &robot, LoadOptions options) { return Union(robot).run(options); }
 
 }  // namespace redag::robot

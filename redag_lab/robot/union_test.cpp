@@ -13,7 +13,6 @@
 #include "redag/model/modes.hpp"
 #include "redag/sched/policy.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
-#include "redag_lab/robot/order.hpp"
 #include "redag_lab/search/analysed.hpp"
 #include "redag_testing/bound_property.hpp"
 #include "redag_testing/builders.hpp"
@@ -24,8 +23,6 @@ namespace {
 
 using testing::make_dag;
 using testing::make_workload;
-
-constexpr std::uint32_t kLevels = 79;
 
 Robot robot_of(std::vector<Workload> workloads, std::vector<CpuSet> sets = {CpuSet{"", {0, 1}}}) {
   Robot robot;
@@ -50,9 +47,8 @@ Workload one_task(Duration period, Duration wcet = 1, std::string group = {}) {
 Threads threads_at(Level::Kind kind, Duration wcet, Duration period) {
   Threads threads;
   threads.name = "x";
-  threads.level = Level{};
-  threads.level->kind = kind;
-  threads.level->rate = period;
+  threads.level.kind = kind;
+  threads.level.rate = period;
   threads.wcet = wcet;
   threads.period = period;
   threads.place = {"cart.yaml", 30, 5};
@@ -60,7 +56,7 @@ Threads threads_at(Level::Kind kind, Duration wcet, Duration period) {
 }
 
 std::string refusal(const Robot &robot) {
-  const Result<LoadedWorkload> united = union_of(robot, kLevels);
+  const Result<LoadedWorkload> united = union_of(robot);
   return united ? "accepted" : to_string(united.error());
 }
 
@@ -71,7 +67,7 @@ Robot linked(Duration transport) {
 }
 
 TEST(RobotUnion, DataOfAnotherProcessAreLateByItsBoundAndTheTransport) {
-  const Result<LoadedWorkload> united = union_of(linked(1), kLevels);
+  const Result<LoadedWorkload> united = union_of(linked(1));
   ASSERT_TRUE(united) << to_string(united.error());
   // Both are of one level: 2 ms, and 1 ms for the other one. Then 1 ms of transport.
   EXPECT_EQ(united->workload.dags[1].tasks[0].jitter, 4 * kMillisecond);
@@ -80,7 +76,7 @@ TEST(RobotUnion, DataOfAnotherProcessAreLateByItsBoundAndTheTransport) {
 TEST(RobotUnion, LaterDataDelayTheirSenderMore) {
   Robot robot = robot_of({one_task(20, 5), one_task(20, 4)}, {CpuSet{"", {0}}});
   robot.links = {{{0, TaskId(0), "p0.d.t"}, {1, TaskId(0), "p1.d.t"}, 4 * kMillisecond, {}}};
-  const Result<LoadedWorkload> united = union_of(robot, kLevels);
+  const Result<LoadedWorkload> united = union_of(robot);
   ASSERT_TRUE(united) << to_string(united.error());
   // The sender ends after 5 + 4 ms. Data that are 9 + 4 ms late let two of the receiver's jobs come in its way: 5 + 8.
   EXPECT_EQ(united->workload.dags[1].tasks[0].jitter, (5 + 8 + 4) * kMillisecond);
@@ -95,7 +91,7 @@ TEST(RobotUnion, DataOfADagAreBehindTheReleaseOfItsSource) {
                                           2, PreemptionMode::Os);
   Robot robot = robot_of({sender, receiver});
   robot.links = {{{0, TaskId(1), "p0.d.t"}, {1, TaskId(0), "p1.d.t"}, 0, {}}};
-  const Result<LoadedWorkload> united = union_of(robot, kLevels);
+  const Result<LoadedWorkload> united = union_of(robot);
   ASSERT_TRUE(united) << to_string(united.error());
   // With groups on two processors, the bound of "t" alone counts from the end of "s".
   EXPECT_GE(united->workload.dags[1].tasks[0].jitter, (2 + 3) * kMillisecond);
@@ -109,7 +105,7 @@ TEST(RobotUnion, NothingSynchronisesDataOfAnotherProcessWithATimer) {
   Robot robot = robot_of({one_task(10, 1), receiver});
   robot.links = {{{0, TaskId(0), "p0.d.t"}, {1, TaskId(0), "p1.d.x"}, kMillisecond, {}}};
   const auto end_to_end = [&] {
-    const Result<LoadedWorkload> united = union_of(robot, kLevels);
+    const Result<LoadedWorkload> united = union_of(robot);
     EXPECT_TRUE(united) << to_string(united.error());
     return analysis::analyze(testing::compiled(united->workload)).dags[1].response;
   };
@@ -117,10 +113,10 @@ TEST(RobotUnion, NothingSynchronisesDataOfAnotherProcessWithATimer) {
   ASSERT_TRUE(end_to_end());
   EXPECT_GE(*end_to_end(), 11'900'000);
   // Data of an event come whenever it does; the timer's data wait for them, but are replaced by its next ones.
-  robot.processes[0].workload->dags[0].tasks[0].phase = Phase::Event;
-  EXPECT_EQ(union_of(robot, kLevels)->workload.dags[1].tasks[0].phase, Phase::Event);
+  robot.processes[0].workload.dags[0].tasks[0].phase = Phase::Event;
+  EXPECT_EQ(union_of(robot)->workload.dags[1].tasks[0].phase, Phase::Event);
   EXPECT_TRUE(end_to_end());
-  robot.processes[1].workload->dags[0].tasks[1].phase = Phase::Event;
+  robot.processes[1].workload.dags[0].tasks[1].phase = Phase::Event;
   EXPECT_FALSE(end_to_end());
 }
 
@@ -128,8 +124,8 @@ TEST(RobotUnion, TasksOfThreadsHaveClocksOfTheirOwn) {
   Robot robot = robot_of({make_workload({make_dag("d", {{.name = "a", .period = 5}, {.name = "b", .period = 5}})}, 2,
                                         PreemptionMode::Os)});
   robot.threads.push_back(threads_at(Level::Kind::Task, 0, 0));
-  robot.threads[0].level->task.task = TaskId(1);
-  const Result<LoadedWorkload> united = union_of(robot, kLevels);
+  robot.threads[0].level.task.task = TaskId(1);
+  const Result<LoadedWorkload> united = union_of(robot);
   ASSERT_TRUE(united) << to_string(united.error());
   EXPECT_EQ(united->workload.dags[0].tasks[0].phase, Phase::Common);
   EXPECT_EQ(united->workload.dags[0].tasks[1].phase, Phase::Unknown);
@@ -139,7 +135,7 @@ TEST(RobotUnion, ThreadsExecuteNoTaskThatSharesWhatAnExecutorKeeps) {
   const auto refusal_of = [](Dag dag) {
     Robot robot = robot_of({make_workload({std::move(dag)}, 2, PreemptionMode::Os)});
     robot.threads.push_back(threads_at(Level::Kind::Task, 0, 0));
-    robot.threads[0].level->task = {0, TaskId(0), "p0.d.a"};
+    robot.threads[0].level.task = {0, TaskId(0), "p0.d.a"};
     return refusal(robot);
   };
   EXPECT_EQ(refusal_of(make_dag("d", {{.name = "a", .period = 5}})), "accepted");
@@ -156,15 +152,15 @@ TEST(RobotUnion, EachProcessHasAClockAndAHiModeOfItsOwn) {
   high.dags[0].criticality = Criticality::High;
   high.dags[0].tasks[0].wcet_low = 1;
   Robot robot = robot_of({high, one_task(10)});
-  const Workload united = union_of(robot, kLevels)->workload;
+  const Workload united = union_of(robot)->workload;
   EXPECT_NE(united.dags[0].executor, united.dags[1].executor);
   EXPECT_TRUE(has_separate_modes(united));
   EXPECT_FALSE(refuse_separate_modes(united, "the simulator"));
   robot.processes.pop_back();
   robot.threads.push_back(threads_at(Level::Kind::Above, kMillisecond, 50 * kMillisecond));
-  EXPECT_TRUE(has_separate_modes(union_of(robot, kLevels)->workload)) << "threads know of no mode";
+  EXPECT_TRUE(has_separate_modes(union_of(robot)->workload)) << "threads know of no mode";
   robot.threads.clear();
-  EXPECT_TRUE(refuse_separate_modes(union_of(robot, kLevels)->workload, "the simulator"));
+  EXPECT_TRUE(refuse_separate_modes(union_of(robot)->workload, "the simulator"));
 }
 
 TEST(RobotUnion, RefusesLinksWithoutABound) {
@@ -172,7 +168,7 @@ TEST(RobotUnion, RefusesLinksWithoutABound) {
             "cart.yaml:40:5: error: data of 'p0.d.t' can arrive 12ms after the release behind them, which is more than "
             "their period 10ms (lower the load, or the rate)");
   Robot robot = linked(1);
-  robot.processes[0].workload->dags[0].tasks[0].wcet = 9 * kMillisecond;
+  robot.processes[0].workload.dags[0].tasks[0].wcet = 9 * kMillisecond;
   robot.processes.push_back(robot.processes[0]);
   robot.processes.back().name = "p2";
   EXPECT_EQ(refusal(robot),
@@ -210,36 +206,26 @@ RC_GTEST_PROP(RobotUnion, IsTheWorkloadWrittenByHand, ()) {
     robot.processes.push_back(std::move(process));
   }
   // What no hand can write: more than one executor starts the jobs, or one with more threads than processors.
-  by_hand.platform.several_executors = count > 1 || robot.processes[0].workload->platform.workers > 2;
-  const Result<LoadedWorkload> united = union_of(robot, kLevels);
+  by_hand.platform.several_executors = count > 1 || robot.processes[0].workload.platform.workers > 2;
+  const Result<LoadedWorkload> united = union_of(robot);
   RC_ASSERT(united.has_value());
   RC_ASSERT(united->workload == by_hand);
 }
 
-// With too few levels the union states the order of levels, and thereby which tasks cannot preempt each other.
-RC_GTEST_PROP(RobotUnion, StatesMergedLevels, ()) {
-  Rng rng(*rc::gen::arbitrary<std::uint64_t>());
-  Robot robot = robot_of({testing::random_workload(rng), testing::random_workload(rng)});
-  for (Process &process : robot.processes) {
-    process.workload->policy = PolicyKind::RateMonotonic;
-    process.workload->platform = Platform{2, PreemptionMode::Os};
-  }
-  const std::uint32_t levels = testing::between(rng, 1, 3);
-  const Result<LoadedWorkload> united = union_of(robot, levels);
-  RC_ASSERT(united.has_value());
-  Workload by_rate = united->workload;
-  by_rate.policy = PolicyKind::RateMonotonic;
-  const auto merged = sched::assign_priorities(by_rate.dags, PolicyKind::RateMonotonic, Ties::Share, levels);
-  const auto stated = sched::assign_priorities(united->workload.dags, united->workload.policy, Ties::Share);
-  for (std::size_t t = 0; t < merged.size(); ++t) {
-    for (std::size_t u = 0; u < merged.size(); ++u) {
-      RC_ASSERT((merged[t].level < merged[u].level) == (stated[t].level < stated[u].level));
-    }
-  }
+TEST(RobotUnion, RefusesMoreRatesThanLevels) {
+  std::vector<Dag> dags;
+  for (std::uint32_t d = 0; d < 79; ++d)
+    dags.push_back(make_dag(fmt::format("d{}", d), {{.name = "t", .period = 200 + d}}));
+  Robot robot = robot_of({make_workload(std::move(dags), 2, PreemptionMode::Os), one_task(200)});
+  EXPECT_EQ(refusal(robot), "accepted");
+  robot.threads.push_back(threads_at(Level::Kind::Rate, kMillisecond, 300 * kMillisecond));
+  EXPECT_EQ(refusal(robot),
+            "cart.yaml:10:5: error: the robot has 80 different rates, and executors tell 79 apart (give similar tasks "
+            "one rate)");
 }
 
 TEST(RobotUnion, KeepsGroupsOfProcessesApart) {
-  const Result<LoadedWorkload> united = union_of(robot_of({one_task(5, 1, "bus"), one_task(10, 1, "bus")}), kLevels);
+  const Result<LoadedWorkload> united = union_of(robot_of({one_task(5, 1, "bus"), one_task(10, 1, "bus")}));
   ASSERT_TRUE(united);
   EXPECT_EQ(united->workload.dags[0].tasks[0].group, "p0/bus");
   EXPECT_EQ(united->workload.dags[1].tasks[0].group, "p1/bus");
@@ -247,8 +233,7 @@ TEST(RobotUnion, KeepsGroupsOfProcessesApart) {
 
 TEST(RobotUnion, CpuSetsAreClusters) {
   const Result<LoadedWorkload> united = union_of(
-      robot_of({one_task(5), one_task(10)}, {CpuSet{"fast", {0}}, CpuSet{"rest", {1, 2}}, CpuSet{"idle", {3}}}),
-      kLevels);
+      robot_of({one_task(5), one_task(10)}, {CpuSet{"fast", {0}}, CpuSet{"rest", {1, 2}}, CpuSet{"idle", {3}}}));
   ASSERT_TRUE(united) << to_string(united.error());
   const Platform &platform = united->workload.platform;
   ASSERT_EQ(platform.clusters.size(), 2u) << "a set without tasks is none";
@@ -259,7 +244,7 @@ TEST(RobotUnion, CpuSetsAreClusters) {
 
 TEST(RobotUnion, RefusesFewerWorkersThanProcessors) {
   Robot robot = robot_of({one_task(5), one_task(10)});
-  robot.processes[1].workload->platform.workers = 1;
+  robot.processes[1].workload.platform.workers = 1;
   EXPECT_EQ(refusal(robot), "accepted") << "a workload that states none has one worker for each processor";
   robot.processes[1].states_workers = true;
   EXPECT_EQ(refusal(robot),
@@ -269,24 +254,36 @@ TEST(RobotUnion, RefusesFewerWorkersThanProcessors) {
 
 TEST(RobotUnion, RefusesOtherOrdersAndModes) {
   Robot robot = robot_of({one_task(5)});
-  robot.processes[0].workload->policy = PolicyKind::Edf;
+  robot.processes[0].workload.policy = PolicyKind::Edf;
   EXPECT_EQ(
       refusal(robot),
       "cart.yaml:10:5: error: process 'p0' orders its jobs by edf, and the robot by rate_monotonic (write 'policy: "
       "rate_monotonic' in the workload of the process, or change the robot's)");
   robot = robot_of({one_task(5)});
-  robot.processes[0].workload->platform.preemption = PreemptionMode::Cooperative;
+  robot.processes[0].workload.platform.preemption = PreemptionMode::Cooperative;
   EXPECT_NE(refusal(robot).find("runs with preemption cooperative"), std::string::npos) << refusal(robot);
   robot.threads.push_back(threads_at(Level::Kind::Task, 0, 0));
-  robot.threads[0].level->task.task = TaskId(0);
+  robot.threads[0].level.task.task = TaskId(0);
   EXPECT_EQ(refusal(robot), "accepted") << "threads execute all its tasks: no executor chooses";
+}
+
+TEST(RobotUnion, ExecutorsWithFixedPrioritiesShareNoOrder) {
+  Robot robot = robot_of({one_task(5), one_task(10)});
+  robot.policy = PolicyKind::Fixed;
+  for (Process &process : robot.processes) process.workload.policy = PolicyKind::Fixed;
+  EXPECT_EQ(refusal(robot),
+            "cart.yaml:11:5: error: executors with policy fixed share no order: their priorities have no meaning for "
+            "each other (order the robot by rate_monotonic or deadline_monotonic)");
+  robot.threads.push_back(threads_at(Level::Kind::Task, 0, 0));
+  robot.threads[0].level.task.task = TaskId(0);
+  EXPECT_EQ(refusal(robot), "accepted") << "only one of the processes has an executor";
 }
 
 TEST(RobotUnion, ThreadsOfARateAreTasks) {
   Robot robot = robot_of({one_task(5), one_task(20)});
   robot.threads.push_back(threads_at(Level::Kind::Rate, kMillisecond, 10 * kMillisecond));
   robot.threads[0].count = 2;
-  const Result<LoadedWorkload> united = union_of(robot, kLevels);
+  const Result<LoadedWorkload> united = union_of(robot);
   ASSERT_TRUE(united) << to_string(united.error());
   EXPECT_EQ(united->workload.policy, PolicyKind::RateMonotonic);
   const Dag &dag = united->workload.dags.back();
@@ -296,12 +293,27 @@ TEST(RobotUnion, ThreadsOfARateAreTasks) {
   EXPECT_EQ(dag.tasks[1].wcet, kMillisecond);
 }
 
+// They keep their own period, and only come where a task of another one does.
+TEST(RobotUnion, ThreadsCanHaveTheLevelOfAnotherRate) {
+  Robot robot = robot_of({one_task(5), one_task(20)});
+  robot.threads.push_back(threads_at(Level::Kind::Rate, kMillisecond, 50 * kMillisecond));
+  robot.threads[0].level.rate = 5 * kMillisecond;
+  const Result<LoadedWorkload> united = union_of(robot);
+  ASSERT_TRUE(united) << to_string(united.error());
+  EXPECT_EQ(united->workload.dags.back().tasks[0].period, 50 * kMillisecond);
+  EXPECT_EQ(united->workload.policy, PolicyKind::Fixed);
+  const auto order = sched::assign_priorities(united->workload.dags, united->workload.policy, Ties::Share);
+  EXPECT_EQ(order[0].level, 0u);
+  EXPECT_EQ(order[1].level, 1u);
+  EXPECT_EQ(order[2].level, 0u);
+}
+
 // The slack of a foreign thread says nothing about the robot: the least one of a task does.
 TEST(RobotUnion, ThreadsThatKeepUpAreNotTheWeakest) {
   Robot robot = robot_of({one_task(10), one_task(20)});
   robot.threads.push_back(threads_at(Level::Kind::Above, 3 * kMillisecond, 4 * kMillisecond));
   const auto weakest = [&] {
-    const Result<LoadedWorkload> united = union_of(robot, kLevels);
+    const Result<LoadedWorkload> united = union_of(robot);
     EXPECT_TRUE(united) << to_string(united.error());
     const Workload &workload = united->workload;
     return lab::weakest_row(lab::analyse(workload, analysis::platform_of(sched::config_of(workload))).value())->name;
@@ -314,7 +326,7 @@ TEST(RobotUnion, ThreadsThatKeepUpAreNotTheWeakest) {
 TEST(RobotUnion, ThreadsAboveComeFirstWhateverTheirPeriod) {
   Robot robot = robot_of({one_task(5), one_task(20)});
   robot.threads.push_back(threads_at(Level::Kind::Above, kMillisecond, 50 * kMillisecond));
-  const Result<LoadedWorkload> united = union_of(robot, kLevels);
+  const Result<LoadedWorkload> united = union_of(robot);
   ASSERT_TRUE(united) << to_string(united.error());
   EXPECT_EQ(united->workload.policy, PolicyKind::Fixed);
   const auto order = sched::assign_priorities(united->workload.dags, united->workload.policy, Ties::Share);
@@ -328,8 +340,8 @@ TEST(RobotUnion, ReservationsComeBeforeAllOthersAndAreBounded) {
   robot.threads.push_back(threads_at(Level::Kind::Above, kMillisecond, 50 * kMillisecond));
   robot.threads.push_back(threads_at(Level::Kind::Reservation, 0, 0));
   robot.threads[1].name = "y";
-  robot.threads[1].level->reservation = {.budget = kMillisecond, .period = 20 * kMillisecond, .tick = kMillisecond};
-  const Result<LoadedWorkload> united = union_of(robot, kLevels);
+  robot.threads[1].level.reservation = {.budget = kMillisecond, .period = 20 * kMillisecond, .tick = kMillisecond};
+  const Result<LoadedWorkload> united = union_of(robot);
   ASSERT_TRUE(united) << to_string(united.error());
   const auto order = sched::assign_priorities(united->workload.dags, united->workload.policy, Ties::Share);
   EXPECT_EQ(order[3].level, 0u);
@@ -344,50 +356,9 @@ TEST(RobotUnion, ReservationsComeBeforeAllOthersAndAreBounded) {
             "other, which no bound covers (give fewer threads a reservation)");
   robot.threads[1].count = 1;
   robot.cpu_sets = {CpuSet{"a", {0}}, CpuSet{"b", {1}}};
-  robot.threads[0].cpus = {0};
   EXPECT_EQ(refusal(robot),
-            "cart.yaml:30:5: error: threads 'y' can delay tasks, and their processors are not those of one CPU set (a "
-            "reservation is for all processors: give the robot 'cpus' instead of 'cpu_sets')");
-}
-
-TEST(RobotUnion, RefusesThreadsThatDelayTasksForAnUnknownTime) {
-  Robot robot = robot_of({one_task(5), one_task(20)});
-  robot.threads.push_back(threads_at(Level::Kind::Above, 0, 0));
-  EXPECT_NE(refusal(robot).find("cart.yaml:30:5: error: threads 'x' can delay tasks, and nothing says for how long"),
-            std::string::npos)
-      << refusal(robot);
-  robot.threads[0].level->kind = Level::Kind::Below;
-  EXPECT_EQ(refusal(robot), "accepted");
-  robot.threads[0].level->kind = Level::Kind::Fifo;
-  robot.threads[0].level->value = 1;
-  EXPECT_EQ(refusal(robot), "accepted");
-  robot.threads[0].level->value = 2;
-  EXPECT_NE(refusal(robot), "accepted");
-  robot.threads[0].cpus = {7};
-  EXPECT_EQ(refusal(robot), "accepted") << "no task runs there";
-  robot.threads[0].wcet = 1;
-  robot.threads[0].period = 10;
-  robot.threads[0].cpus = {1};
-  EXPECT_NE(refusal(robot).find("their processors are not those of one CPU set"), std::string::npos) << refusal(robot);
-}
-
-TEST(RobotOrder, RatesOfAllProcessesInterleave) {
-  Robot robot = robot_of({one_task(5), one_task(10), one_task(20)});
-  robot.processes[0].workload->dags.push_back(make_dag("slow", {{.name = "t", .period = 20}}));
-  robot.threads.push_back(threads_at(Level::Kind::Rate, 0, 7 * kMillisecond));
-  robot.threads.push_back(threads_at(Level::Kind::Nice, 0, 0));
-  const Order order = order_of(robot, kLevels);
-  EXPECT_EQ(order.of_task[0], (std::vector<std::uint32_t>{0, 3}));
-  EXPECT_EQ(order.of_task[1], (std::vector<std::uint32_t>{2}));
-  EXPECT_EQ(order.of_task[2], (std::vector<std::uint32_t>{3})) << "the same rate, the same level";
-  EXPECT_EQ(order.of_threads[0], 1u);
-  EXPECT_FALSE(order.of_threads[1]);
-  EXPECT_FALSE(order.is_merged());
-  EXPECT_EQ(order.ranks, 4u);
-  const Order merged = order_of(robot, 2);
-  EXPECT_TRUE(merged.is_merged());
-  EXPECT_EQ(merged.levels, 2u);
-  EXPECT_EQ(merged.of_task[0], (std::vector<std::uint32_t>{0, 1}));
+            "cart.yaml:30:5: error: threads 'y' have a reservation, which the kernel gives only for all processors "
+            "(give the robot 'cpus' instead of 'cpu_sets')");
 }
 
 }  // namespace

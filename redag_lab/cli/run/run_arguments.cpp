@@ -137,13 +137,8 @@ std::optional<Workload> load_configured(const RunArguments &arguments, Console &
     return std::nullopt;
   }
   const bool has_links = input->robot && !input->robot->links.empty();
-  Result<LoadedWorkload> loaded = robot::as_workload(*std::move(input));
-  if (!loaded) {
-    console.note(loaded.error());
-    return std::nullopt;
-  }
-  console.note(loaded->warnings);
-  Workload workload = std::move(loaded->workload);
+  console.note(input->loaded.warnings);
+  Workload workload = std::move(input->loaded.workload);
   const bool is_unchanged = !arguments.policy && !arguments.ties && !arguments.preemption && arguments.workers == 0;
   // What is said about the data of other processes was found for the platform of the file.
   const bool has_overheads = arguments.calibration || arguments.overheads != sim::Overheads{};

@@ -71,30 +71,9 @@ Json facts_json(const std::string &name, const Facts &facts) {
 std::string describe(const robot::Robot &robot) {
   std::size_t cpus = 0;
   for (const robot::CpuSet &set : robot.cpu_sets) cpus += set.cpus.size();
-  return fmt::format("robot of {} on {}, {}, {} of threads, {} of irqs",
-                     plural(robot.processes.size(), "process", "processes"), plural(cpus, "processor"),
-                     plural(robot.links.size(), "link"), plural(robot.threads.size(), "entry", "entries"),
-                     plural(robot.interrupts.size(), "entry", "entries"));
-}
-
-// A sound robot may have no workload that says what it does: `redag arrange` takes it all the same.
-Diagnostics as_warnings(Diagnostics found) {
-  for (Diagnostic &each : found) each.severity = Severity::Warning;
-  return found;
-}
-
-Diagnostics findings_of(const Result<robot::Input> &input) {
-  if (!input) return input.error();
-  Diagnostics found = input->warnings;
-  const Diagnostics more = input->workload ? input->workload->warnings : as_warnings(input->workload.error());
-  found.insert(found.end(), more.begin(), more.end());
-  return found;
-}
-
-std::string describe(const robot::Input &input) {
-  std::string text = input.robot ? describe(*input.robot) : "";
-  if (!input.workload) return text + ", not to be analysed as one workload";
-  return text + (text.empty() ? "" : ": ") + describe(facts_of(input.workload->workload));
+  return fmt::format("robot of {} on {}, {}, {} of threads: ", plural(robot.processes.size(), "process", "processes"),
+                     plural(cpus, "processor"), plural(robot.links.size(), "link"),
+                     plural(robot.threads.size(), "entry", "entries"));
 }
 
 int validate_files(const ValidateOptions &options, Console &console) {
@@ -102,22 +81,20 @@ int validate_files(const ValidateOptions &options, Console &console) {
   bool all_ok = true;
   for (const std::string &file : options.files) {
     const Result<robot::Input> input = load_workload_or_robot(file, {.wcet_optional = true, .waits = true});
-    const Diagnostics found = findings_of(input);
+    const Diagnostics &found = input ? input->loaded.warnings : input.error();
     const bool ok = input.has_value() && (found.empty() || !options.strict);
     all_ok = all_ok && ok;
     if (options.json) {
       files.push_back(Json{{"file", file}, {"ok", ok}, {"diagnostics", diagnostics_json(found)}});
       if (input && input->robot) files.back()["robot"] = input->robot->name;
-      if (input && input->workload) {
-        const Workload &workload = input->workload->workload;
-        files.back()["workload"] = facts_json(workload.name, facts_of(workload));
-      }
+      if (input) files.back()["workload"] = facts_json(input->loaded.workload.name, facts_of(input->loaded.workload));
       continue;
     }
     console.note(found);
     if (ok) {
       const std::string verdict = tinted("ok", Tint::Good, console.out_traits().colour);
-      console.say(fmt::format("{}: {}: {}\n", file, verdict, describe(*input)));
+      console.say(fmt::format("{}: {}: {}{}\n", file, verdict, input->robot ? describe(*input->robot) : "",
+                              describe(facts_of(input->loaded.workload))));
     } else if (input) {
       console.error(fmt::format("{}: {} not accepted by --strict", file, plural(found.size(), "warning")));
     }

@@ -30,7 +30,6 @@ Action add_analyze(CLI::App &app);
 Action add_sensitivity(CLI::App &app);
 Action add_assign(CLI::App &app);
 Action add_tune(CLI::App &app);
-Action add_arrange(CLI::App &app);
 Action add_experiment(CLI::App &app);
 Action add_check_trace(CLI::App &app);
 Action add_events(CLI::App &app);

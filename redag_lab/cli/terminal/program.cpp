@@ -78,12 +78,6 @@ constexpr std::array kCommands = {
           "  redag tune workloads/robot.yaml\n"
           "  redag tune workloads/robot.yaml --objective max_lateness -o tuned.yaml\n"
           "  redag tune workloads/robot.yaml --vary max_active --caps 2-5 --all-trials\n"},
-    Entry{"arrange", "Put the processes of a robot, and other threads, into one order", add_arrange,
-          "  redag arrange examples/robot/cart.yaml\n"
-          "  redag arrange examples/robot/arm.yaml\n"
-          "  redag arrange examples/robot/cart.yaml --levels drive\n"
-          "  sudo redag arrange examples/robot/cart.yaml --apply\n"
-          "  sudo redag arrange examples/robot/cart.yaml --undo\n"},
     Entry{"experiment", "Run experiments over many workloads: seeded, parallel, resumable", add_experiment,
           "  redag experiment acceptance experiments/acceptance_tasks.yaml\n"
           "  redag experiment acceptance --help\n"

@@ -40,7 +40,7 @@ Result<robot::Input> load_workload_or_robot(const std::string &path, LoadOptions
   if (!text) return tl::unexpected<Diagnostics>(std::move(text.error()));
   const bool is_file = path != "-";
   Result<robot::Input> input = robot::parse_input(*text, is_file ? path : "<stdin>", options);
-  if (input && input->workload) name_after(is_file ? path : "stdin", input->workload->workload);
+  if (input) name_after(is_file ? path : "stdin", input->loaded.workload);
   if (source != nullptr) *source = *std::move(text);
   return input;
 }
