@@ -32,14 +32,13 @@ SYSTEM_KEYS = {
     "libyaml-dev": "libyaml-dev",
     "nlohmann-json-dev": "nlohmann-json3-dev",
     "pkg-config": "pkg-config",
-    "python3-pytest": "python3-pytest",
     "tbb": "libtbb-dev",
     "zlib": "zlib1g-dev",
 }
 # Packages of the distributions themselves: ros-<distribution>-<name>.
 ROS_KEYS = {"ament_cmake", "ament_index_python", "composition_interfaces", "diagnostic_msgs", "launch", "launch_ros", "rcl",
             "pal_statistics_msgs", "rcl_interfaces", "rclcpp", "rclcpp_action", "rclcpp_components", "rclcpp_lifecycle", "rcutils", "rmw",
-            "ros2cli", "rosbag2_compression", "rosbag2_compression_zstd", "rosbag2_cpp", "rosbag2_storage",
+            "rosbag2_compression", "rosbag2_compression_zstd", "rosbag2_cpp", "rosbag2_storage",
             "rosbag2_storage_default_plugins", "rosgraph_msgs", "std_msgs", "std_srvs", "test_msgs", "tracetools"}
 # Names that find_package() looks for, with the rosdep key that installs them. The C library has the threads,
 # and packages are built without MPI and LTTng.
@@ -61,8 +60,7 @@ OPTIONAL = {"redag_rclcpp": {"cm_executors"},
 # Folders of the repository that a package uses where they are there, and does without elsewhere.
 BESIDE = ("../benchmarks/counted", "../redag_testing")
 ROS_PACKAGES = ("redag_rclcpp", "redag_rclcpp_lab")
-CMAKE_BUILT = ("redag", "redag_analysis", "redag_lab", *ROS_PACKAGES)
-PACKAGES = (*CMAKE_BUILT, "ros2redag")
+PACKAGES = ("redag", "redag_analysis", "redag_lab", *ROS_PACKAGES)
 
 
 def version_of(package):
@@ -123,13 +121,13 @@ class Rosdep(unittest.TestCase):
     def test_every_key_is_installed_by_bootstrap(self):
         """The Debian names are correct: tools/bootstrap, which builds without ROS, lists the same."""
         words = set(re.findall(r"[\w.+-]+", (SOURCE / "tools/bootstrap").read_text()))
-        for package in CMAKE_BUILT:
+        for package in PACKAGES:
             for key in keys_of(package) & set(SYSTEM_KEYS):
                 self.assertIn(SYSTEM_KEYS[key], words, f"{package}/package.xml: {key}")
 
     def test_what_is_found_is_declared(self):
         """A package.xml lists everything that the CMakeLists.txt looks for, regardless of what its dependencies need."""
-        for package in CMAKE_BUILT:
+        for package in PACKAGES:
             found = looked_for(package) - OPTIONAL.get(package, set())
             self.assertGreater(len(found), 2, package)
             keys = keys_of(package)
@@ -139,7 +137,7 @@ class Rosdep(unittest.TestCase):
 
     def test_what_is_included_is_declared(self):
         """Tests of redag, redag_analysis and redag_lab belong to the repository's build."""
-        for package in CMAKE_BUILT:
+        for package in PACKAGES:
             keys, folders = keys_of(package), set()
             for file in files_of(package, ".hpp", ".cpp"):
                 if package in ROS_PACKAGES or not file.name.endswith("_test.cpp"):
@@ -149,14 +147,6 @@ class Rosdep(unittest.TestCase):
             for folder in folders - OPTIONAL.get(package, set()) - {package}:
                 key = HEADER_FOLDERS.get(folder, folder)
                 self.assertTrue(key is None or key in keys, f"{package} includes {folder}/, but has no <depend> on {key}")
-
-    def test_what_python_imports_is_declared(self):
-        keys, imported = keys_of("ros2redag"), set()
-        for file in files_of("ros2redag", ".py"):
-            if file.parent.name != "test" and file.name != "setup.py":
-                imported.update(re.findall(r"^(?:from|import) (\w+)", file.read_text(), re.MULTILINE))
-        self.assertIn("ros2cli", imported)
-        self.assertEqual(imported - set(sys.stdlib_module_names) - keys, {"ros2redag"})
 
     def test_redag_needs_no_test_library(self):
         """colcon builds the libraries and the program. The repository's own build holds their tests."""
@@ -169,7 +159,7 @@ class Alone(unittest.TestCase):
     """A release has one source tree for each package."""
 
     def test_no_build_file_leaves_its_folder(self):
-        for package in CMAKE_BUILT:
+        for package in PACKAGES:
             files = files_of(package, "CMakeLists.txt", ".cmake", ".in")
             self.assertGreater(len(files), 0, package)
             for file in files:
@@ -188,7 +178,7 @@ class Alone(unittest.TestCase):
 
     def test_all_have_one_version(self):
         self.assertEqual({version_of(package) for package in PACKAGES}, {version_of("redag")})
-        for package in CMAKE_BUILT:  # CMake reads it, and so does ros2redag/setup.py
+        for package in PACKAGES:
             text = (SOURCE / package / "CMakeLists.txt").read_text()
             self.assertRegex(text, rf"project\({package} VERSION \$\{{version\}} ")
 
