@@ -65,8 +65,6 @@ class PictureReader {
     bool has_event = false;
     while (packet.next()) {
       switch (packet.tag()) {
-        case 1: bundle(packet.get_message()); break;
-        case 2: process_tree(packet.get_message()); break;
         case 6: clock_snapshot(packet.get_message()); break;
         case 8: stamp = packet.get_uint64(); break;
         case 10: sequence = packet.get_uint32(); break;
@@ -144,17 +142,6 @@ class PictureReader {
       switch (descriptor.tag()) {
         case 1: id = descriptor.get_uint64(); break;
         case 2: its.name = descriptor.get_string(); break;
-        case 4: {
-          pbf_reader thread = descriptor.get_message();
-          while (thread.next()) {
-            if (thread.tag() == 2) {
-              its.name = "thread " + std::to_string(thread.get_int64());
-            } else {
-              thread.skip();
-            }
-          }
-          break;
-        }
         case 5: its.parent = descriptor.get_uint64(); break;
         case 8: is_counter = true; [[fallthrough]];
         default: descriptor.skip();
@@ -227,65 +214,6 @@ class PictureReader {
       EXPECT_EQ(type, 4);
       picture_.counters[one.track].push_back({time, value});
     }
-  }
-
-  void process_tree(pbf_reader tree) {
-    while (tree.next()) {
-      const std::uint32_t kind = tree.tag();
-      pbf_reader one = tree.get_message();
-      int number = 0;
-      std::string name;
-      while (one.next()) {
-        if (one.tag() == 1) {
-          number = one.get_int32();
-        } else if (one.tag() == 3 && kind == 2) {
-          EXPECT_TRUE(picture_.processes.contains(one.get_int32()));
-        } else {
-          name = one.get_string();
-        }
-      }
-      (kind == 1 ? picture_.processes : picture_.threads)[number] = name;
-    }
-  }
-
-  void bundle(pbf_reader bundle) {
-    std::uint32_t cpu = 0;
-    while (bundle.next()) {
-      if (bundle.tag() == 1) {
-        cpu = bundle.get_uint32();
-      } else {
-        kernel_event(bundle.get_message(), cpu);
-      }
-    }
-  }
-
-  void kernel_event(pbf_reader event, std::uint32_t cpu) {
-    static const std::map<std::uint32_t, std::pair<std::string, std::vector<std::string>>> kKinds = {
-        {4,
-         {"sched_switch", {"prev_comm", "prev_pid", "prev_prio", "prev_state", "next_comm", "next_pid", "next_prio"}}},
-        {24, {"softirq_entry", {"vec"}}},
-        {25, {"softirq_exit", {"vec"}}},
-        {36, {"irq_handler_entry", {"irq", "name"}}},
-        {37, {"irq_handler_exit", {"irq", "ret"}}}};
-    PictureKernelEvent one;
-    one.cpu = cpu;
-    while (event.next()) {
-      if (event.tag() == 1) {
-        one.time = static_cast<Time>(event.get_uint64());
-      } else if (event.tag() == 2) {
-        one.fields["pid"] = std::to_string(event.get_uint32());
-      } else {
-        const auto &[kind, fields] = kKinds.at(event.tag());
-        one.kind = kind;
-        pbf_reader its = event.get_message();
-        while (its.next()) {
-          const bool is_text = its.wire_type() == protozero::pbf_wire_type::length_delimited;
-          std::string &field = one.fields[fields.at(its.tag() - 1)];
-          field = is_text ? its.get_string() : std::to_string(its.get_int64());
-        }
-      }
-    }
-    picture_.kernel.push_back(std::move(one));
   }
 
   Picture picture_;

@@ -34,21 +34,10 @@ struct PictureCount {
   std::int64_t value = 0;
 };
 
-/// An event of the kernel: "sched_switch" with the threads, "irq_handler_entry" with the name, ...
-struct PictureKernelEvent {
-  Time time = 0;
-  std::uint32_t cpu = 0;
-  std::string kind;
-  std::map<std::string, std::string> fields;
-};
-
 struct Picture {
   std::vector<PictureEvent> slices;  // by their ends
   std::vector<PictureEvent> instants;
   std::map<std::string, std::vector<PictureCount>> counters;  // by track
-  std::vector<PictureKernelEvent> kernel;
-  std::map<int, std::string> processes;
-  std::map<int, std::string> threads;
   std::size_t packets = 0;
   std::size_t bytes = 0;  // of the packets before compression
 

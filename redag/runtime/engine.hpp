@@ -159,7 +159,11 @@ class Engine {
   /// Sets the origin (CLOCK_MONOTONIC) of all times that the scheduler sees. Until then now() is 0. Call it before any
   /// release.
   void set_origin(Time monotonic) noexcept { origin_.store(monotonic, std::memory_order_relaxed); }
-  [[nodiscard]] bool has_origin() const noexcept { return origin_.load(std::memory_order_relaxed) != kNever; }
+  /// Nothing before set_origin().
+  [[nodiscard]] std::optional<Time> origin() const noexcept {
+    const Time origin = origin_.load(std::memory_order_relaxed);
+    return origin == kNever ? std::nullopt : std::optional(origin);
+  }
   [[nodiscard]] Time now() const noexcept {
     const Time origin = origin_.load(std::memory_order_relaxed);
     return origin == kNever ? 0 : monotonic_now() - origin;

@@ -255,6 +255,7 @@ trace::RunInfo Executor::Impl::run_info() const {
   info.preemption = to_string(setup_.mode.mode);
   info.preemption_why = setup_.mode.reason;
   info.driver = trace::Driver::Threads;
+  info.origin = engine_->origin();
   info.workload = workload();
   const LockGuard guard(lock_);
   std::set<std::string> names;

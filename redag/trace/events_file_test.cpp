@@ -231,10 +231,12 @@ TEST_F(EventsFile, WhatChangedInTheRunIsKept) {
   Trace trace = example();
   trace.info.removals = {{TaskId(0), 70}};
   trace.info.settled = 80;
+  trace.info.origin = 1234;
   written(trace);
   const RunInfo read = read_trace(path_).value().info;
   EXPECT_EQ(read.removals, trace.info.removals);
   EXPECT_EQ(read.settled, trace.info.settled);
+  EXPECT_EQ(read.origin, trace.info.origin);
   std::string bad = run_info_to_json(trace.info);
   const std::string task = "\"task\":0";
   bad.replace(bad.find(task), task.size(), "\"task\":99");

@@ -179,6 +179,7 @@ RunInfo info_from(const Json &json) {
   info.overheads = text_of(json, "overheads");
   info.machine = machine_from(member(json, "machine"));
   info.remarks = remarks_from(json);
+  if (json.contains("origin_ns")) info.origin = integer_of(json, "origin_ns", 0, kMaxTraceTime);
   if (json.contains("settled_ns")) info.settled = integer_of(json, "settled_ns", -kMaxTraceTime, kMaxTraceTime);
   return info;
 }
@@ -217,6 +218,7 @@ std::string run_info_to_json(const RunInfo &info) {
   for (const Removal &removal : info.removals) {
     json["removals"].push_back({{"task", removal.task.value}, {"at_ns", removal.at}});
   }
+  if (info.origin) json["origin_ns"] = *info.origin;
   if (info.settled) json["settled_ns"] = *info.settled;
   // Texts from outside may not be UTF-8; a replaced character is better than no file.
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);

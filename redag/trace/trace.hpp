@@ -76,6 +76,7 @@ struct RunInfo {
   std::vector<Remark> remarks;
   std::vector<TaskId> event_tasks;  // timer tasks that the program releases: no grid, at least a period apart
   std::vector<Removal> removals;
+  std::optional<Time> origin;  // on threads: CLOCK_MONOTONIC at time 0
   // When rates, deadlines or levels last changed: `workload` says what held from then on. Earlier events are not held
   // to rules that follow from these.
   std::optional<Time> settled;

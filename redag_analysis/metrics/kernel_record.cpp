@@ -3,340 +3,224 @@
 
 #include "redag_analysis/metrics/kernel_record.hpp"
 
-#include <fmt/format.h>
-#include <zlib.h>
-
 #include <algorithm>
 #include <array>
-#include <filesystem>
-#include <limits>
-#include <nlohmann/json.hpp>
+#include <charconv>
 #include <system_error>
-#include <type_traits>
-#include <utility>
-
-#include "redag/base/check.hpp"
-#include "redag/base/text.hpp"
-#include "redag/trace/input_file.hpp"
-#include "redag/trace/output_file.hpp"
 
 namespace redag::metrics {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
-constexpr const char *kKernelFormat = "redag.kernel/2";
-constexpr int kGzip = 15 + 16;     // zlib's window bits for its own form of gzip
-constexpr int kAnyForm = 15 + 32;  // recognise the form
-constexpr int kLevel = 1;          // the run goes on meanwhile
 constexpr std::size_t kChunk = std::size_t{1} << 16U;
 constexpr std::size_t kLongestLine = std::size_t{1} << 16U;
 
-bool is_time(const Json &value) {
-  if (!value.is_number_integer()) return false;
-  const auto time = value.get<std::int64_t>();
-  return time >= -trace::kMaxTraceTime && time <= trace::kMaxTraceTime;
+std::optional<std::int64_t> number(std::string_view text) {
+  std::int64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end == text.data()) return std::nullopt;
+  return value;
 }
 
-bool are_integers(const Json &row, std::initializer_list<std::size_t> places) {
-  return std::all_of(places.begin(), places.end(), [&](std::size_t i) { return row[i].is_number_integer(); });
+std::optional<int> small_number(std::string_view text) {
+  const std::optional<std::int64_t> value = number(text);
+  if (!value || *value < 0 || *value > 1'000'000'000) return std::nullopt;
+  return static_cast<int>(*value);
 }
 
-// Reads a line such as ["switch",time,cpu,from,runnable,to,priority]. Returns nothing if it is none.
-std::optional<KernelRow> row_of(const Json &row) {
-  if (!row.is_array() || row.empty() || !row[0].is_string()) return std::nullopt;
-  const std::string_view kind = row[0].get_ref<const std::string &>();
-  if (kind == "switch") {
-    if (row.size() != 7 || !is_time(row[1]) || !are_integers(row, {2, 3, 5, 6}) || !row[4].is_boolean()) return {};
-    return KernelSwitch{row[1], row[2], row[3], row[4], row[5], row[6]};
-  }
-  if (kind == "interrupt") {
-    if (row.size() != 5 || !is_time(row[1]) || !is_time(row[2]) || !are_integers(row, {3}) || !row[4].is_string())
-      return {};
-    if (row[2].get<Time>() < row[1].get<Time>()) return {};
-    return KernelInterrupt{row[1], row[2], row[3], row[4]};
-  }
-  if (kind == "job") {
-    if (row.size() != 4 || !row[1].is_number_unsigned() || !row[2].is_number_unsigned() || !are_integers(row, {3}))
-      return {};
-    return JobThread{TaskId(row[1].get<std::uint32_t>()), row[2], row[3]};
-  }
-  if (kind == "thread") {
-    if (row.size() != 4 || !are_integers(row, {1, 3}) || !row[2].is_string()) return {};
-    return KernelThread{row[1], row[2], row[3]};
-  }
-  if (kind == "process") {
-    if (row.size() != 3 || !are_integers(row, {1}) || !row[2].is_string() || row[1].get<int>() == 0) return {};
-    return KernelProcess{row[1], row[2]};
-  }
-  if (kind != "lost" || row.size() != 2 || !row[1].is_number_unsigned()) return {};
-  return KernelLoss{row[1]};
+// The text between the last `name` and the next space; empty if there is none. Names of threads can hold anything, and
+// stand before the numbers.
+std::string_view field(std::string_view fields, std::string_view name) {
+  const std::size_t at = fields.rfind(name);
+  if (at == std::string_view::npos) return {};
+  fields.remove_prefix(at + name.size());
+  return fields.substr(0, fields.find(' '));
 }
 
-std::string quoted(const std::string &text) { return Json(text).dump(-1, ' ', false, Json::error_handler_t::replace); }
-
-}  // namespace
-
-std::optional<Time> time_of(const KernelRow &row) {
-  if (const auto *one = std::get_if<KernelSwitch>(&row)) return one->time;
-  if (const auto *one = std::get_if<KernelInterrupt>(&row)) return one->end;
+// "1234.567890" or "1234.567890123" in nanoseconds.
+std::optional<Time> time_in(std::string_view text) {
+  const std::size_t point = text.find('.');
+  if (point == std::string_view::npos) return std::nullopt;
+  const std::string_view digits = text.substr(point + 1);
+  const auto seconds = number(text.substr(0, point));
+  const auto fraction = number(digits);
+  if (!seconds || !fraction || *seconds < 0 || *seconds > kMaxDuration / kSecond - 1 || *fraction < 0) return {};
+  if (digits.size() == 6) return *seconds * kSecond + *fraction * kMicrosecond;
+  if (digits.size() == 9) return *seconds * kSecond + *fraction;
   return std::nullopt;
 }
 
-std::string kernel_line(const KernelRow &row) {
-  return std::visit(
-      [](const auto &one) {
-        using Row = std::decay_t<decltype(one)>;
-        if constexpr (std::is_same_v<Row, KernelSwitch>) {
-          return fmt::format("[\"switch\",{},{},{},{},{},{}]\n", one.time, one.cpu, one.from, one.runnable, one.to,
-                             one.to_priority);
-        } else if constexpr (std::is_same_v<Row, KernelInterrupt>) {
-          return fmt::format("[\"interrupt\",{},{},{},{}]\n", one.begin, one.end, one.cpu, quoted(one.name));
-        } else if constexpr (std::is_same_v<Row, KernelProcess>) {
-          return fmt::format("[\"process\",{},{}]\n", one.process, quoted(one.name));
-        } else if constexpr (std::is_same_v<Row, KernelThread>) {
-          return fmt::format("[\"thread\",{},{},{}]\n", one.thread, quoted(one.name), one.process);
-        } else if constexpr (std::is_same_v<Row, JobThread>) {
-          return fmt::format("[\"job\",{},{},{}]\n", one.task.value, one.number, one.thread);
-        } else {
-          return fmt::format("[\"lost\",{}]\n", one.events);
-        }
-      },
-      row);
-}
-
-class KernelWriter::Impl {
- public:
-  explicit Impl(trace::OutputFile file) : file_(std::move(file)) {
-    const int status = ::deflateInit2(&stream_, kLevel, Z_DEFLATED, kGzip, 8, Z_DEFAULT_STRATEGY);
-    REDAG_CHECK(status == Z_OK, "zlib has no memory");
-  }
-  ~Impl() { ::deflateEnd(&stream_); }
-  Impl(const Impl &) = delete;
-  Impl &operator=(const Impl &) = delete;
-
-  void write(std::string_view text) {
-    text_ += text;
-    if (text_.size() >= kChunk) compress(Z_NO_FLUSH);
-  }
-
-  Result<void> commit() {
-    compress(Z_FINISH);
-    return file_.commit();
-  }
-
- private:
-  void compress(int flush) {
-    stream_.next_in = reinterpret_cast<Bytef *>(text_.data());
-    stream_.avail_in = static_cast<uInt>(text_.size());
-    do {
-      stream_.next_out = reinterpret_cast<Bytef *>(out_.data());
-      stream_.avail_out = static_cast<uInt>(out_.size());
-      static_cast<void>(::deflate(&stream_, flush));
-      file_.write({out_.data(), out_.size() - stream_.avail_out});
-    } while (stream_.avail_out == 0);
-    text_.clear();
-  }
-
-  trace::OutputFile file_;
-  z_stream stream_{};
-  std::string text_;
-  std::array<char, kChunk> out_{};
+struct ThreadText {
+  std::string_view name;
+  std::optional<int> thread;
+  std::optional<int> priority;
 };
 
-KernelWriter::KernelWriter(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-KernelWriter::KernelWriter(KernelWriter &&) noexcept = default;
-KernelWriter &KernelWriter::operator=(KernelWriter &&) noexcept = default;
-KernelWriter::~KernelWriter() = default;
-
-Result<KernelWriter> KernelWriter::create(const std::string &path, const Provenance &run) {
-  Result<trace::OutputFile> file = trace::OutputFile::create(path);
-  if (!file) return tl::unexpected<Diagnostics>(std::move(file.error()));
-  KernelWriter writer(std::make_unique<Impl>(*std::move(file)));
-  writer.impl_->write(fmt::format("{{\"format\":\"{}\",\"provenance\":{}}}\n", kKernelFormat, provenance_to_json(run)));
-  return writer;
+// "prev_comm=redag-0 prev_pid=77 prev_prio=48 prev_state=R ==> next_comm=..." of tracefs and perf.
+std::optional<KernelSwitch> labelled_switch(std::string_view fields) {
+  const std::size_t arrow = fields.rfind(" ==> next_comm=");
+  if (arrow == std::string_view::npos) return std::nullopt;
+  const std::string_view previous = fields.substr(0, arrow);
+  const std::string_view next = fields.substr(arrow + 15);
+  const auto from = small_number(field(previous, " prev_pid="));
+  const auto to = small_number(field(next, " next_pid="));
+  const auto priority = small_number(field(next, " next_prio="));
+  const std::string_view state = field(previous, " prev_state=");
+  if (!from || !to || !priority || state.empty()) return std::nullopt;
+  return KernelSwitch{.from = *from,
+                      .runnable = state.front() == 'R',
+                      .to = *to,
+                      .to_priority = *priority,
+                      .to_name = std::string(next.substr(0, next.rfind(" next_pid=")))};
 }
 
-void KernelWriter::add(const KernelRow &row) { impl_->write(kernel_line(row)); }
-
-Result<void> KernelWriter::commit() {
-  impl_->write("{\"end\":true}\n");
-  return impl_->commit();
+// "redag-0:77 [48]" of trace-cmd.
+ThreadText short_thread(std::string_view text) {
+  const std::size_t bracket = text.rfind(" [");
+  const std::size_t colon = text.rfind(':', bracket);
+  if (bracket == std::string_view::npos || colon == std::string_view::npos) return {};
+  return {text.substr(0, colon), small_number(text.substr(colon + 1)), small_number(text.substr(bracket + 2))};
 }
 
-class KernelReader::Impl {
- public:
-  explicit Impl(trace::InputFile file) : file_(std::move(file)) {
-    // A file that was decompressed by hand is read as it is.
-    const Result<std::string_view> first = file_.read(0, 1);
-    is_plain_ = first && !first->empty() && first->front() == '{';
-    if (is_plain_) return;
-    const int status = ::inflateInit2(&stream_, kAnyForm);
-    REDAG_CHECK(status == Z_OK, "zlib has no memory");
-  }
-  ~Impl() {
-    if (!is_plain_) ::inflateEnd(&stream_);
-  }
-  Impl(const Impl &) = delete;
-  Impl &operator=(const Impl &) = delete;
+// "redag-0:77 [48] R ==> stress:99 [120]" of trace-cmd.
+std::optional<KernelSwitch> short_switch(std::string_view fields) {
+  const std::size_t arrow = fields.rfind(" ==> ");
+  const std::size_t bracket = fields.rfind("] ", arrow);
+  if (arrow == std::string_view::npos || bracket == std::string_view::npos || bracket + 2 >= arrow) return std::nullopt;
+  const ThreadText previous = short_thread(fields.substr(0, bracket));
+  const ThreadText next = short_thread(fields.substr(arrow + 5));
+  if (!previous.thread || !next.thread || !next.priority) return std::nullopt;
+  return KernelSwitch{.from = *previous.thread,
+                      .runnable = fields[bracket + 2] == 'R',
+                      .to = *next.thread,
+                      .to_priority = *next.priority,
+                      .to_name = std::string(next.name)};
+}
 
-  Result<Provenance> head() {
-    const Result<std::optional<std::string_view>> line = next_line();
-    const Json json = line && *line ? parsed(**line) : Json();
-    if (!json.is_object() || json.value("format", Json()) != kKernelFormat) {
-      return error("this is not a kernel's record of a run", "'redag run --kernel' writes one");
-    }
-    Result<Provenance> run = provenance_from_json(json.value("provenance", Json::object()).dump());
-    if (!run) return error("the provenance is not an object of texts");
-    return run;
-  }
+// The name of an interrupt: "virtio0" of "irq=25 name=virtio0", "TIMER" of "vec=1 [action=TIMER]".
+std::string name_of(std::string_view fields, bool soft) {
+  std::string name(soft ? field(fields, "[action=") : fields.substr(std::min(fields.size(), fields.find("name=") + 5)));
+  if (soft && !name.empty() && name.back() == ']') name.pop_back();
+  return soft ? "softirq " + name : name;
+}
 
-  Result<std::optional<KernelRow>> next() {
+}  // namespace
+
+Time time_of(const KernelRow &row) {
+  const auto *const interrupt = std::get_if<KernelInterrupt>(&row);
+  return interrupt != nullptr ? interrupt->end : std::get<KernelSwitch>(row).time;
+}
+
+Result<std::optional<KernelRow>> KernelReader::next() {
+  for (;;) {
     const Result<std::optional<std::string_view>> line = next_line();
     if (!line) return tl::unexpected<Diagnostics>(line.error());
-    if (is_complete_) {
-      if (*line) return error("there is text after the last line");
-      return std::optional<KernelRow>();
+    if (!*line) return std::optional<KernelRow>();
+    std::optional<KernelRow> row = read(**line);
+    if (!row) continue;
+    if (last_ && time_of(*row) < *last_) {
+      ++lost_;
+      continue;
     }
-    if (!*line) return error("the file is incomplete: its last line is missing");
-    const Json json = parsed(**line);
-    if (json.is_object() && json.contains("end")) {
-      is_complete_ = true;
-      return next();
-    }
-    std::optional<KernelRow> row = row_of(json);
-    const std::optional<Time> time = row ? time_of(*row) : std::nullopt;
-    if (!row || (time && *time < last_)) return error("this line is no event of the kernel, or not in order of time");
-    if (time) last_ = *time;
+    last_ = time_of(*row);
     return row;
   }
+}
 
- private:
-  static Json parsed(std::string_view line) {
-    return json_is_too_large(line) ? Json() : Json::parse(line, nullptr, false);
-  }
-
-  [[nodiscard]] tl::unexpected<Diagnostics> error(std::string message, std::string hint = {}) const {
-    return trace::file_error(file_.name(), number_, std::move(message), std::move(hint));
-  }
-
-  // The next line without its line feed, valid until the next call. Nothing after the last one.
-  Result<std::optional<std::string_view>> next_line() {
-    ++number_;
-    for (;;) {
-      const std::size_t end = text_.find('\n', at_);
-      if (end != std::string::npos) {
-        const std::string_view line = std::string_view(text_).substr(at_, end - at_);
-        at_ = end + 1;
-        return std::optional(line);
-      }
-      text_.erase(0, std::exchange(at_, 0));
-      if (text_.size() > kLongestLine) return error("this line is too long for an event of the kernel");
-      const std::size_t before = text_.size();
-      if (Result<void> more = load(); !more) return tl::unexpected<Diagnostics>(std::move(more.error()));
-      if (text_.size() > before) continue;
-      if (text_.empty()) return std::optional<std::string_view>();
-      at_ = text_.size();
-      return std::optional(std::string_view(text_));
+// The next line without its line feed, valid until the next call. Nothing after the last one.
+Result<std::optional<std::string_view>> KernelReader::next_line() {
+  for (;;) {
+    const std::size_t end = text_.find('\n', at_);
+    if (end != std::string::npos) {
+      const std::string_view line = std::string_view(text_).substr(at_, end - at_);
+      at_ = end + 1;
+      return std::optional(line);
     }
+    text_.erase(0, std::exchange(at_, 0));
+    if (text_.size() > kLongestLine) text_.clear();  // no event of the kernel
+    const Result<std::string_view> more = file_.read(offset_, kChunk);
+    if (!more) return tl::unexpected<Diagnostics>(more.error());
+    if (more->empty()) return std::optional<std::string_view>();
+    text_ += *more;
+    offset_ += more->size();
   }
+}
 
-  // Appends text of the file. Appends none at its end.
-  Result<void> load() {
-    for (;;) {
-      const Result<std::string_view> bytes = file_.read(offset_, kChunk);
-      if (!bytes) return tl::unexpected<Diagnostics>(bytes.error());
-      if (is_plain_) {
-        text_ += *bytes;
-        offset_ += bytes->size();
-        return {};
-      }
-      if (is_over_) {
-        if (bytes->empty()) return {};
-        return error("there are bytes after the compressed text");
-      }
-      std::array<char, kChunk> out;
-      stream_.next_in = reinterpret_cast<Bytef *>(const_cast<char *>(bytes->data()));
-      stream_.avail_in = static_cast<uInt>(bytes->size());
-      stream_.next_out = reinterpret_cast<Bytef *>(out.data());
-      stream_.avail_out = static_cast<uInt>(out.size());
-      const int status = ::inflate(&stream_, Z_NO_FLUSH);
-      offset_ += bytes->size() - stream_.avail_in;
-      text_.append(out.data(), out.size() - stream_.avail_out);
-      is_over_ = status == Z_STREAM_END;
-      if (status != Z_OK && status != Z_STREAM_END && status != Z_BUF_ERROR) {
-        return error("the compressed text is damaged", "copy the file again");
-      }
-      if (stream_.avail_out < out.size()) return {};
-      if (bytes->empty() && !is_over_) return error("the file is incomplete: its compressed text ends early");
-    }
+// A line such as "  redag-0-77  [001] d..2.  12.345678: sched_switch: prev_comm=... ==> next_comm=...". perf writes the
+// event as "sched:sched_switch:".
+std::optional<KernelRow> KernelReader::read(std::string_view line) {
+  if (line.starts_with("CPU:")) {
+    const std::size_t bracket = line.find('[');
+    const std::size_t digits = line.find_first_of("0123456789", bracket);  // "[LOST 12 EVENTS]", "[12 EVENTS DROPPED]"
+    if (bracket != std::string_view::npos && digits != std::string_view::npos &&
+        line.find("EVENTS", digits) != line.npos)
+      lost_ += static_cast<std::uint64_t>(small_number(line.substr(digits)).value_or(0));
+    return std::nullopt;
   }
+  constexpr std::array<std::string_view, 5> kEvents = {
+      "sched_switch:", "irq_handler_entry:", "irq_handler_exit:", "softirq_entry:", "softirq_exit:"};
+  for (const std::string_view event : kEvents) {
+    const std::size_t at = line.find(event);
+    if (at == std::string_view::npos) continue;
+    const std::string_view head = line.substr(0, at);
+    const std::size_t colon = head.find_last_not_of("schedirq: ");  // the last digit of the time
+    const std::size_t blank = head.rfind(' ', colon);
+    const std::size_t bracket = head.rfind('[');
+    if (colon == std::string_view::npos || blank == std::string_view::npos || bracket == std::string_view::npos)
+      return {};
+    const std::optional<Time> time = time_in(head.substr(blank + 1, colon - blank));
+    const std::optional<int> cpu = small_number(head.substr(bracket + 1));
+    std::string_view fields = line.substr(at + event.size());
+    fields.remove_prefix(std::min(fields.size(), fields.find_first_not_of(' ')));
+    if (!time || !cpu) return std::nullopt;
+    if (event != kEvents[0]) return read_interrupt(event, *time - origin_, *cpu, fields);
+    std::optional<KernelSwitch> found = labelled_switch(fields);
+    if (!found) found = short_switch(fields);
+    if (!found) return std::nullopt;
+    found->time = *time - origin_;
+    found->cpu = *cpu;
+    return *std::move(found);
+  }
+  return std::nullopt;
+}
 
-  trace::InputFile file_;
-  bool is_plain_ = false;
-  bool is_over_ = false;      // the compressed text has ended
-  bool is_complete_ = false;  // the last line was read
-  z_stream stream_{};
-  std::uint64_t offset_ = 0;  // in the file
-  std::string text_;          // some of the lines
-  std::size_t at_ = 0;        // in the text: the next line
-  int number_ = 0;            // of the last line
-  Time last_ = std::numeric_limits<Time>::min();
-};
+std::optional<KernelRow> KernelReader::read_interrupt(std::string_view event, Time time, int cpu,
+                                                      std::string_view fields) {
+  const bool soft = event.starts_with("softirq");
+  const std::pair key(cpu, soft);
+  if (event.ends_with("entry:")) {
+    open_[key] = {time, time, cpu, name_of(fields, soft)};
+    return std::nullopt;
+  }
+  const auto begun = open_.find(key);
+  if (begun == open_.end() || time < begun->second.begin) return std::nullopt;
+  KernelInterrupt interrupt = std::move(begun->second);
+  open_.erase(begun);
+  interrupt.end = time;
+  return interrupt;
+}
 
-KernelReader::KernelReader(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-KernelReader::KernelReader(KernelReader &&) noexcept = default;
-KernelReader &KernelReader::operator=(KernelReader &&) noexcept = default;
-KernelReader::~KernelReader() = default;
-
-Result<std::optional<KernelRow>> KernelReader::next() { return impl_->next(); }
-
-Result<KernelRecord> KernelRecord::open(const std::string &path) {
+Result<KernelRecord> KernelRecord::open(const std::string &path, Time origin) {
+  const Result<trace::InputFile> file = trace::InputFile::open(path);
+  if (!file) return tl::unexpected<Diagnostics>(file.error());
   KernelRecord record;
   record.path_ = path;
-  return opened(std::move(record));
-}
-
-Result<KernelRecord> KernelRecord::of(std::string bytes, const std::string &file) {
-  KernelRecord record;
-  record.path_ = file;
-  record.bytes_ = std::make_shared<const std::string>(std::move(bytes));
-  return opened(std::move(record));
-}
-
-Result<std::optional<KernelRecord>> KernelRecord::beside(const std::string &trace, const trace::RunInfo &run) {
-  const std::string path = (std::filesystem::path(trace).parent_path() / kKernelFile).string();
-  std::error_code ignored;
-  if (!std::filesystem::exists(path, ignored)) return std::optional<KernelRecord>();
-  Result<KernelRecord> record = open(path);
-  if (!record) return tl::unexpected<Diagnostics>(std::move(record.error()));
-  if (!(record->run_ == run.provenance)) return std::optional<KernelRecord>();
-  return std::optional<KernelRecord>(*std::move(record));
-}
-
-Result<KernelRecord> KernelRecord::opened(KernelRecord record) {
-  Result<KernelReader> reader = record.begin();
-  if (!reader) return tl::unexpected<Diagnostics>(std::move(reader.error()));
-  Result<Provenance> run = reader->impl_->head();
-  if (!run) return tl::unexpected<Diagnostics>(std::move(run.error()));
-  record.run_ = *std::move(run);
+  record.origin_ = origin;
   return record;
 }
 
-Result<KernelReader> KernelRecord::begin() const {
-  Result<trace::InputFile> file =
-      bytes_ ? Result<trace::InputFile>(trace::InputFile(*bytes_, path_)) : trace::InputFile::open(path_);
-  if (!file) return tl::unexpected<Diagnostics>(std::move(file.error()));
-  return KernelReader(std::make_unique<KernelReader::Impl>(*std::move(file)));
+KernelRecord KernelRecord::of(std::string text, Time origin) {
+  KernelRecord record;
+  record.path_ = "kernel.txt";
+  record.bytes_ = std::make_shared<const std::string>(std::move(text));
+  record.origin_ = origin;
+  return record;
 }
 
 Result<KernelReader> KernelRecord::read() const {
-  Result<KernelReader> reader = begin();
-  if (!reader) return reader;
-  const Result<Provenance> run = reader->impl_->head();
-  if (!run) return tl::unexpected<Diagnostics>(run.error());
-  if (!(*run == run_)) return trace::file_error(path_, 1, "the file is of another run than a moment ago");
-  return reader;
+  if (bytes_) return KernelReader(trace::InputFile(*bytes_, path_), bytes_, origin_);
+  Result<trace::InputFile> file = trace::InputFile::open(path_);
+  if (!file) return tl::unexpected<Diagnostics>(std::move(file.error()));
+  return KernelReader(*std::move(file), nullptr, origin_);
 }
 
 }  // namespace redag::metrics

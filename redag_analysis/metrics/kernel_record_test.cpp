@@ -4,129 +4,93 @@
 #include "redag_analysis/metrics/kernel_record.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
-#include <filesystem>
+#include <string>
 #include <vector>
-
-#include "redag/trace/output_file.hpp"
 
 namespace redag::metrics {
 namespace {
 
-// All rows, or the first error.
-Result<std::vector<KernelRow>> rows_of(const Result<KernelRecord> &record) {
-  if (!record) return tl::unexpected<Diagnostics>(record.error());
-  Result<KernelReader> reader = record->read();
-  if (!reader) return tl::unexpected<Diagnostics>(reader.error());
+constexpr Time kZero = 100 * kSecond;
+
+struct Read {
   std::vector<KernelRow> rows;
-  for (;;) {
-    const Result<std::optional<KernelRow>> row = reader->next();
-    if (!row) return tl::unexpected<Diagnostics>(row.error());
-    if (!*row) return rows;
-    rows.push_back(**row);
-  }
-}
-
-class KernelRecordFile : public ::testing::Test {
- protected:
-  void SetUp() override {
-    run_.created = "2026-01-31T12:00:00Z";
-    run_.command = "redag run --kernel";
-    Result<KernelWriter> writer = KernelWriter::create(path_, run_);
-    ASSERT_TRUE(writer) << to_string(writer.error());
-    for (const KernelRow &row : rows_) writer->add(row);
-    for (int i = 0; i < 3'000; ++i) {
-      rows_.emplace_back(KernelSwitch{.time = 10 + i, .cpu = i % 2, .from = 7 + i % 3, .to = 7 + i % 5});
-      writer->add(rows_.back());
-    }
-    const Result<void> written = writer->commit();
-    ASSERT_TRUE(written) << to_string(written.error());
-  }
-  ~KernelRecordFile() override { std::filesystem::remove(path_); }
-
-  Provenance run_;
-  std::vector<KernelRow> rows_{KernelProcess{7, "robot"},
-                               KernelThread{7, "redag-0", 7},
-                               KernelThread{8, "a \"name\"\\ [x]", 0},
-                               JobThread{TaskId(1), 4, 7},
-                               KernelLoss{3},
-                               KernelSwitch{-5, 0, 0, false, 7, 48},
-                               KernelInterrupt{1, 2, 0, "eth0"},
-                               KernelSwitch{10, 1, 7, true, 8, 120}};
-  const std::string path_ =
-      (std::filesystem::path(::testing::TempDir()) / ("redag_kernel_record." + std::to_string(::getpid()))).string();
+  std::uint64_t lost = 0;
 };
 
-TEST_F(KernelRecordFile, IsReadAsItWasWritten) {
-  const Result<KernelRecord> record = KernelRecord::open(path_);
-  ASSERT_TRUE(record) << to_string(record.error());
-  EXPECT_EQ(record->run(), run_);
-  for (int round = 0; round < 2; ++round) {
-    const Result<std::vector<KernelRow>> rows = rows_of(record);
-    ASSERT_TRUE(rows) << to_string(rows.error());
-    EXPECT_EQ(*rows, rows_);
-  }
-  EXPECT_LT(std::filesystem::file_size(path_), 8 * rows_.size()) << "this is hardly compressed";
+Read read(std::string text) {
+  Read all;
+  KernelReader reader = KernelRecord::of(std::move(text), kZero).read().value();
+  while (std::optional<KernelRow> row = reader.next().value()) all.rows.push_back(*std::move(row));
+  all.lost = reader.lost();
+  return all;
 }
 
-TEST_F(KernelRecordFile, IsOfItsRunAlone) {
-  const std::string folder = path_ + ".folder";
-  std::filesystem::create_directory(folder);
-  trace::RunInfo info;
-  const auto found = [&] {
-    const Result<std::optional<KernelRecord>> record = KernelRecord::beside(folder + "/events.redag", info);
-    EXPECT_TRUE(record) << to_string(record.error());
-    return record && *record;
-  };
-  EXPECT_FALSE(found());
-  std::filesystem::copy_file(path_, folder + "/kernel.jsonl.gz");
-  EXPECT_FALSE(found());
-  info.provenance = run_;
-  EXPECT_TRUE(found());
-  std::filesystem::remove_all(folder);
+// As Linux 6 writes it, with a thread that has a difficult name.
+constexpr std::string_view kTracefs =
+    "# tracer: nop\n"
+    "          <idle>-0       [001] d..2.   100.000001: sched_switch: prev_comm=swapper/1 prev_pid=0 prev_prio=120 "
+    "prev_state=R ==> next_comm=redag-0 next_pid=77 next_prio=48\n"
+    "         redag-0-77      [001] d.h1.   100.000010: irq_handler_entry: irq=25 name=virtio0-req.0\n"
+    "         redag-0-77      [001] d.h1.   100.000012: irq_handler_exit: irq=25 ret=handled\n"
+    "         redag-0-77      [001] ..s1.   100.000020: softirq_entry: vec=1 [action=TIMER]\n"
+    "         redag-0-77      [001] ..s1.   100.000021: softirq_exit: vec=1 [action=TIMER]\n"
+    "         redag-0-77      [001] d..2.   100.000030: sched_switch: prev_comm=redag-0 prev_pid=77 prev_prio=48 "
+    "prev_state=R+ ==> next_comm=a next_pid=1 x next_pid=99 next_prio=9\n"
+    "CPU:1 [LOST 12 EVENTS]\n"
+    " a next_pid=1 x-99      [001] d..2.   100.000040: sched_switch: prev_comm=a next_pid=1 x prev_pid=99 prev_prio=9 "
+    "prev_state=S ==> next_comm=redag-0 next_pid=77 next_prio=48\n";
+
+TEST(KernelRecord, ReadsTracefs) {
+  const std::vector<KernelRow> rows = {
+      KernelSwitch{1000, 1, 0, true, 77, 48, "redag-0"}, KernelInterrupt{10'000, 12'000, 1, "virtio0-req.0"},
+      KernelInterrupt{20'000, 21'000, 1, "softirq TIMER"}, KernelSwitch{30'000, 1, 77, true, 99, 9, "a next_pid=1 x"},
+      KernelSwitch{40'000, 1, 99, false, 77, 48, "redag-0"}};
+  const Read all = read(std::string(kTracefs));
+  EXPECT_EQ(all.rows, rows);
+  EXPECT_EQ(all.lost, 12U);
 }
 
-// A cut or changed file is refused, or a change that gzip's checksum finds at the end.
-TEST_F(KernelRecordFile, DamageIsFound) {
-  const std::string bytes = trace::read_file(path_).value();
-  for (std::size_t size = 0; size < bytes.size(); size += 1 + bytes.size() / 97) {
-    const auto rows = rows_of(KernelRecord::of(bytes.substr(0, size), "kernel.jsonl.gz"));
-    ASSERT_FALSE(rows) << size;
-    EXPECT_EQ(rows.error().front().file, "kernel.jsonl.gz");
-  }
-  for (std::size_t at = 10; at < bytes.size(); at += 1 + bytes.size() / 97) {
-    std::string changed = bytes;
-    changed[at] = static_cast<char>(changed[at] ^ 0x10);
-    EXPECT_FALSE(rows_of(KernelRecord::of(changed, "kernel.jsonl.gz"))) << at;
-  }
-  EXPECT_FALSE(rows_of(KernelRecord::of(bytes + "more", "kernel.jsonl.gz")));
+TEST(KernelRecord, ReadsTraceCmd) {
+  const Read all = read(
+      "cpus=2\n"
+      "          <idle>-0     [001]   100.000001: sched_switch:         swapper/1:0 [120] R ==> redag-0:77 [48]\n"
+      "CPU:1 [3 EVENTS DROPPED]\n"
+      "         redag-0-77    [001]   100.000010123: irq_handler_entry:    irq=25 name=eth0\n"
+      "         redag-0-77    [001]   100.000012123: irq_handler_exit:     irq=25 ret=handled\n"
+      "         redag-0-77    [001]   100.000030: sched_switch:         redag-0:77 [48] S ==> a: [1] b:99 [120]\n");
+  const std::vector<KernelRow> rows = {KernelSwitch{1000, 1, 0, true, 77, 48, "redag-0"},
+                                       KernelInterrupt{10'123, 12'123, 1, "eth0"},
+                                       KernelSwitch{30'000, 1, 77, false, 99, 120, "a: [1] b"}};
+  EXPECT_EQ(all.rows, rows);
+  EXPECT_EQ(all.lost, 3U);
 }
 
-TEST(KernelRecord, MistakesHaveTheirLine) {
-  const std::string head = R"({"format":"redag.kernel/2"})"
-                           "\n";
-  const auto error = [&](const std::string &text) {
-    const auto rows = rows_of(KernelRecord::of(text, "kernel.jsonl"));
-    return rows ? std::string("none") : rows.error().front().to_string();
-  };
-  EXPECT_EQ(error(head + "{\"end\":true}\n"), "none");
-  EXPECT_EQ(error(head + "{\"end\":true}"), "none");
-  EXPECT_EQ(error(head), "kernel.jsonl:2:1: error: the file is incomplete: its last line is missing");
-  EXPECT_NE(error(head + "{\"end\":true}\n[]\n").find("kernel.jsonl:3:1: error: there is text"), std::string::npos);
-  for (const char *none : {"", "x", "{}\n", "{\"format\":\"redag.kernel/1\"}\n"}) {
-    EXPECT_NE(error(none).find("kernel.jsonl:1:1: error: this is not a kernel's record"), std::string::npos) << none;
-  }
-  for (const char *bad : {"[]", "[1]", "[\"switch\",1,0,0,true,7]", "[\"switch\",1,0,0,1,7,8]", "[\"job\",-1,0,7]",
-                          "[\"thread\",1,2,0]", "[\"thread\",1,\"x\",true]", "[\"process\",0,\"x\"]", "[\"lost\",-1]",
-                          "[\"interrupt\",2,1,0,\"x\"]", "[\"switch\",9223372036854775807,0,0,true,7,8]", "nonsense"}) {
-    EXPECT_NE(error(head + bad + "\n").find("kernel.jsonl:2:1: error: this line is no event"), std::string::npos)
-        << bad;
-  }
-  const std::string late = "[\"switch\",5,0,0,true,7,8]\n[\"switch\",4,0,0,true,7,8]\n";
-  EXPECT_NE(error(head + late).find("kernel.jsonl:3:1: "), std::string::npos);
-  EXPECT_NE(error(head + std::string(1 << 20, 'x')).find("too long"), std::string::npos);
+TEST(KernelRecord, ReadsPerfAndLeavesOutWhatIsNotInOrder) {
+  const Read all = read(
+      "swapper     0 [000]   100.000001: sched:sched_switch: prev_comm=swapper/0 prev_pid=0 prev_prio=120 prev_state=R "
+      "==> next_comm=redag-0 next_pid=77 next_prio=48\n"
+      "redag-0    77 [000]   100.000010: irq:softirq_entry: vec=9 [action=RCU]\n"
+      "redag-0    77 [000]   100.000012: irq:softirq_exit: vec=9 [action=RCU]\n"
+      "redag-0    77 [000]    99.000000: sched:sched_switch: prev_comm=redag-0 prev_pid=77 prev_prio=48 prev_state=S "
+      "==> next_comm=swapper/0 next_pid=0 next_prio=120\n");
+  const std::vector<KernelRow> rows = {KernelSwitch{1000, 0, 0, true, 77, 48, "redag-0"},
+                                       KernelInterrupt{10'000, 12'000, 0, "softirq RCU"}};
+  EXPECT_EQ(all.rows, rows);
+  EXPECT_EQ(all.lost, 1U);
 }
+
+TEST(KernelRecord, IgnoresWhatItDoesNotKnow) {
+  // Each line without one of its characters is read or ignored, and breaks nothing.
+  for (std::size_t i = 0; i < kTracefs.size(); ++i) {
+    std::string damaged(kTracefs);
+    damaged.erase(i, 1);
+    EXPECT_LE(read(damaged).rows.size(), 5U);
+  }
+  EXPECT_TRUE(read(std::string(200'000, 'x')).rows.empty());
+}
+
+TEST(KernelRecord, WhatTheSystemRefusesIsAnError) { EXPECT_FALSE(KernelRecord::open("/nonexistent/kernel.txt", 0)); }
 
 }  // namespace
 }  // namespace redag::metrics

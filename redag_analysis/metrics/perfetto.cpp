@@ -12,7 +12,6 @@
 
 #include "redag/model/clusters.hpp"
 #include "redag_analysis/metrics/deadline_watch.hpp"
-#include "redag_analysis/metrics/perfetto_kernel.hpp"
 #include "redag_analysis/metrics/perfetto_packets.hpp"
 #include "redag_analysis/metrics/perfetto_tracks.hpp"
 
@@ -45,7 +44,7 @@ const char *to_text(Miss miss) {
 
 class PerfettoWriter::Impl {
  public:
-  Impl(trace::OutputFile file, const trace::RunInfo &run, std::optional<KernelReader> kernel)
+  Impl(trace::OutputFile file, const trace::RunInfo &run)
       : writer_(std::move(file)),
         run_(run),
         refs_(flatten(run.workload)),
@@ -55,14 +54,11 @@ class PerfettoWriter::Impl {
     write_run();
     add_workers();
     add_tasks();
-    if (kernel) kernel_.emplace(writer_, *std::move(kernel), run.start);
   }
 
   void add(const JobEvent &event) {
     if (event.task.value >= tasks_.size()) return;
     last_time_ = std::max(last_time_, event.time);
-    // Some time ahead, because the recorder logs a job's thread after the body began.
-    if (kernel_ && kernel_read_) kernel_read_ = kernel_->read_until(event.time + 100 * kMillisecond);
     counters_.advance(since_start(last_time_));
     watch_.add(std::span(&event, 1), [&](const JudgedJob &judged) { finish(event, judged); });
     if (event.kind == JobEventKind::Released) return release(event);
@@ -88,7 +84,6 @@ class PerfettoWriter::Impl {
         break;
       case JobEventKind::Served: mark(event, "served"); break;
       case JobEventKind::Woken: mark(event, "woken"); break;
-      case JobEventKind::Started: begin_body(event, *job); break;
       default: break;  // the others are done above, or show nothing
     }
   }
@@ -100,8 +95,6 @@ class PerfettoWriter::Impl {
       if (Live *const job = find(task, judged.record.number); job != nullptr) close(*job, task, end, end, judged);
     });
     counters_.advance(kNever);
-    if (kernel_ && kernel_read_) kernel_read_ = kernel_->finish();
-    if (!kernel_read_) return kernel_read_;
     return writer_.commit();
   }
 
@@ -113,7 +106,6 @@ class PerfettoWriter::Impl {
     bool started = false;
     std::uint32_t worker = WorkerId::kNoneValue;  // on which it has an open slice
     std::vector<std::uint64_t> flows_in;          // of the data that it will use
-    int thread = 0;                               // that runs its body
   };
   struct Worker {
     SliceTrack slices;
@@ -293,21 +285,6 @@ class PerfettoWriter::Impl {
     return true;
   }
 
-  void begin_body(const JobEvent &event, Live &job) {
-    if (!kernel_ || job.thread != 0) return;
-    const KernelThreads &threads = kernel_->threads();
-    const std::optional<int> thread = threads.thread_of(event.task, event.job);
-    if (!thread) return;
-    job.thread = *thread;
-    Track &track = threads_[*thread];
-    if (track == Track::None) {
-      track = writer_.add_thread(threads.name_of(*thread), threads.process_of(*thread), *thread);
-    }
-    const TaskState &task = tasks_[event.task.value];
-    const std::array arguments = {Argument(job_, std::int64_t{event.job})};
-    writer_.begin(track, since_start(event.value), task.name, task.category, {.arguments = arguments});
-  }
-
   // Begins an arrow to each successor of a task, from a job that finished now.
   const std::vector<std::uint64_t> &begin_flows(TaskState &task) {
     for (std::uint64_t &flow : task.data) flow = ++flows_;
@@ -331,7 +308,6 @@ class PerfettoWriter::Impl {
     std::span<const std::uint64_t> flows;
     if (record.outcome == JobOutcome::Finished) flows = begin_flows(task);
     if (close_slice(job, end, flows)) flows = {};
-    if (job.thread != 0) writer_.end(threads_[job.thread], since_start(end));
     if (judged.miss == Miss::Deadline && record.deadline <= end) {
       const std::array arguments = {Argument(job_, std::int64_t{job.number})};
       writer_.instant(lane.track(), since_start(record.deadline), writer_.event_name("deadline missed"), arguments);
@@ -349,8 +325,6 @@ class PerfettoWriter::Impl {
 
   PacketWriter writer_;
   const trace::RunInfo &run_;
-  std::optional<perfetto::KernelDrawing> kernel_;
-  Result<void> kernel_read_;
   std::vector<TaskRef> refs_;
   DeadlineWatch watch_;
   Counters counters_;
@@ -359,7 +333,6 @@ class PerfettoWriter::Impl {
   std::vector<DagCounters> dags_;
   std::vector<TaskState> tasks_;
   std::unordered_map<std::uint32_t, Worker> workers_;
-  std::unordered_map<int, Track> threads_;
   ArgumentName job_ = ArgumentName::None;
   ArgumentName outcome_ = ArgumentName::None;
   ArgumentName miss_ = ArgumentName::None;
@@ -374,17 +347,10 @@ PerfettoWriter::PerfettoWriter(std::unique_ptr<Impl> impl) : impl_(std::move(imp
 PerfettoWriter::PerfettoWriter(PerfettoWriter &&) noexcept = default;
 PerfettoWriter::~PerfettoWriter() = default;
 
-Result<PerfettoWriter> PerfettoWriter::create(const std::string &path, const trace::RunInfo &run,
-                                              const std::optional<KernelRecord> &kernel) {
-  std::optional<KernelReader> reader;
-  if (kernel) {
-    Result<KernelReader> begun = kernel->read();
-    if (!begun) return tl::unexpected<Diagnostics>(std::move(begun.error()));
-    reader = *std::move(begun);
-  }
+Result<PerfettoWriter> PerfettoWriter::create(const std::string &path, const trace::RunInfo &run) {
   Result<trace::OutputFile> file = trace::OutputFile::create(path);
   if (!file) return tl::unexpected<Diagnostics>(std::move(file.error()));
-  return PerfettoWriter(std::make_unique<Impl>(std::move(*file), run, std::move(reader)));
+  return PerfettoWriter(std::make_unique<Impl>(std::move(*file), run));
 }
 
 void PerfettoWriter::add(std::span<const JobEvent> events) {
@@ -393,9 +359,8 @@ void PerfettoWriter::add(std::span<const JobEvent> events) {
 
 Result<void> PerfettoWriter::commit(Time end) { return impl_->commit(end); }
 
-Result<void> write_perfetto(const std::string &path, const trace::Trace &trace,
-                            const std::optional<KernelRecord> &kernel) {
-  Result<PerfettoWriter> writer = PerfettoWriter::create(path, trace.info, kernel);
+Result<void> write_perfetto(const std::string &path, const trace::Trace &trace) {
+  Result<PerfettoWriter> writer = PerfettoWriter::create(path, trace.info);
   if (!writer) return tl::unexpected<Diagnostics>(std::move(writer.error()));
   writer->add(trace.events);
   return writer->commit(trace.info.end);

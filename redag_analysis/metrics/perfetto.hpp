@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Writes trace.pftrace for ui.perfetto.dev and trace_processor: a track for each worker with the jobs that it ran, for
-// each task with its jobs from release to end, and counters; with the kernel's record also processors and threads.
-// docs/results_format.md describes them. Events are written as they are read; memory does not grow with the run.
+// each task with its jobs from release to end, and counters. docs/results_format.md describes them. Events are written
+// as they are read; memory does not grow with the run.
 #pragma once
 
 #include <memory>
@@ -12,16 +12,13 @@
 
 #include "redag/base/result.hpp"
 #include "redag/trace/trace.hpp"
-#include "redag_analysis/metrics/kernel_record.hpp"
 
 namespace redag::metrics {
 
 class PerfettoWriter {
  public:
-  /// Opens the file. `run`, whose `end` is not used, must outlive this object. `kernel` is what the kernel recorded
-  /// meanwhile.
-  [[nodiscard]] static Result<PerfettoWriter> create(const std::string &path, const trace::RunInfo &run,
-                                                     const std::optional<KernelRecord> &kernel = std::nullopt);
+  /// Opens the file. `run`, whose `end` is not used, must outlive this object.
+  [[nodiscard]] static Result<PerfettoWriter> create(const std::string &path, const trace::RunInfo &run);
   PerfettoWriter(PerfettoWriter &&) noexcept;
   PerfettoWriter &operator=(PerfettoWriter &&) = delete;
   PerfettoWriter(const PerfettoWriter &) = delete;
@@ -39,7 +36,6 @@ class PerfettoWriter {
   std::unique_ptr<Impl> impl_;
 };
 
-[[nodiscard]] Result<void> write_perfetto(const std::string &path, const trace::Trace &trace,
-                                          const std::optional<KernelRecord> &kernel = std::nullopt);
+[[nodiscard]] Result<void> write_perfetto(const std::string &path, const trace::Trace &trace);
 
 }  // namespace redag::metrics

@@ -114,19 +114,6 @@ Track PacketWriter::add_track(std::string_view name, Track parent) { return add_
 
 Track PacketWriter::add_counter(std::string_view name, Track parent) { return add_track(name, parent, true); }
 
-Track PacketWriter::add_thread(std::string_view name, int process, int thread) {
-  const Track track{++tracks_};
-  packet([&](Builder<TracePacket> &packet) {
-    Builder<TrackDescriptor> descriptor(packet, TracePacket::TrackDescriptor);
-    descriptor.add_uint(TrackDescriptor::Uuid, value(track));
-    Builder<ThreadDescriptor> its(descriptor, TrackDescriptor::Thread);
-    its.add_int(ThreadDescriptor::Pid, process);
-    its.add_int(ThreadDescriptor::Tid, thread);
-    its.add_text(ThreadDescriptor::ThreadName, name);
-  });
-  return track;
-}
-
 // Most packets follow each other in time: the difference to the one before is enough. Others state their time.
 void PacketWriter::set_time(Builder<TracePacket> &packet, Time time) {
   time = std::max<Time>(time, 0);

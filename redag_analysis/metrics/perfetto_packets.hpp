@@ -69,24 +69,12 @@ class PacketWriter {
   /// name are drawn as one.
   Track add_track(std::string_view name, Track parent = Track::None);
   Track add_counter(std::string_view name, Track parent);
-  /// A thread's track, on which the kernel's record of the thread is drawn as well.
-  Track add_thread(std::string_view name, int process, int thread);
 
   // Times count from the beginning of the trace; earlier ones become 0. On a track, slices have to nest.
   void begin(Track track, Time time, EventName name, Category category, const SliceDetails &details = {});
   void end(Track track, Time time, const SliceDetails &details = {});
   void instant(Track track, Time time, EventName name, std::span<const Argument> arguments);
   void count(Track track, Time time, std::int64_t value);
-
-  /// Writes a packet that `fill` makes.
-  template <class Fill>
-  void packet(Fill fill) {
-    Builder<TracePacket> packet(trace_, Trace::Packet);
-    packet.add_uint(TracePacket::TrustedPacketSequenceId, kSequence);
-    fill(packet);
-  }
-  /// Compresses what was written, if that is much. Call it between packets that packet() wrote.
-  void flush_if_full();
 
   /// Completes the file.
   [[nodiscard]] Result<void> commit();
@@ -96,6 +84,14 @@ class PacketWriter {
 
   using Numbers = std::map<std::string, std::uint64_t, std::less<>>;
 
+  /// Writes a packet that `fill` makes.
+  template <class Fill>
+  void packet(Fill fill) {
+    Builder<TracePacket> packet(trace_, Trace::Packet);
+    packet.add_uint(TracePacket::TrustedPacketSequenceId, kSequence);
+    fill(packet);
+  }
+  void flush_if_full();
   std::uint64_t number_of(Numbers &numbers, InternedData kind, std::string_view text);
   Track add_track(std::string_view name, Track parent, bool is_counter);
   void set_time(Builder<TracePacket> &packet, Time time);

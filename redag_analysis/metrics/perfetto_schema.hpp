@@ -14,8 +14,6 @@ using Tag = std::uint32_t;
 enum class Trace : Tag { Packet = 1 };
 
 enum class TracePacket : Tag {
-  FtraceEvents = 1,
-  ProcessTree = 2,
   ClockSnapshot = 6,
   Timestamp = 8,
   TrustedPacketSequenceId = 10,
@@ -35,7 +33,7 @@ enum class TracePacketDefaults : Tag { TimestampClockId = 58 };
 
 enum class ClockSnapshot : Tag { Clocks = 1, PrimaryTraceClock = 2 };
 enum class Clock : Tag { ClockId = 1, Timestamp = 2, IsIncremental = 3 };
-inline constexpr std::uint32_t kBootTime = 6;     // the clock of a trace, and of the kernel's events
+inline constexpr std::uint32_t kBootTime = 6;     // the clock of a trace
 inline constexpr std::uint32_t kDeltaClock = 64;  // the first of those that belong to a sequence of packets
 
 enum class InternedData : Tag {
@@ -49,14 +47,12 @@ enum class InternedString : Tag { Iid = 1, Text = 2 };
 enum class TrackDescriptor : Tag {
   Uuid = 1,
   Name = 2,
-  Thread = 4,
   ParentUuid = 5,
   Counter = 8,
   ChildOrdering = 11,
   SiblingOrderRank = 12,
 };
 inline constexpr std::int32_t kExplicitOrder = 3;  // of ChildOrdering
-enum class ThreadDescriptor : Tag { Pid = 1, Tid = 2, ThreadName = 5 };
 enum class CounterDescriptor : Tag { Unit = 3 };
 inline constexpr std::int32_t kUnitCount = 2;
 
@@ -75,32 +71,5 @@ inline constexpr std::int32_t kSliceEnd = 2;
 inline constexpr std::int32_t kInstant = 3;
 inline constexpr std::int32_t kCounter = 4;
 enum class DebugAnnotation : Tag { NameIid = 1, IntValue = 4, StringValue = 6, StringValueIid = 17 };
-
-enum class ProcessTree : Tag { Processes = 1, Threads = 2 };
-enum class Process : Tag { Pid = 1, Cmdline = 3 };
-enum class Thread : Tag { Tid = 1, Name = 2, Tgid = 3 };
-
-enum class FtraceEventBundle : Tag { Cpu = 1, Event = 2 };
-enum class FtraceEvent : Tag {
-  Timestamp = 1,
-  Pid = 2,
-  SchedSwitch = 4,
-  SoftirqEntry = 24,
-  SoftirqExit = 25,
-  IrqHandlerEntry = 36,
-  IrqHandlerExit = 37,
-};
-enum class SchedSwitch : Tag {
-  PrevComm = 1,
-  PrevPid = 2,
-  PrevPrio = 3,
-  PrevState = 4,
-  NextComm = 5,
-  NextPid = 6,
-  NextPrio = 7,
-};
-enum class IrqHandlerEntry : Tag { Irq = 1, Name = 2 };
-enum class IrqHandlerExit : Tag { Irq = 1, Ret = 2 };
-enum class Softirq : Tag { Vec = 1 };
 
 }  // namespace redag::metrics::perfetto

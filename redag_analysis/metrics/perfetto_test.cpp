@@ -16,7 +16,6 @@
 #include "redag_analysis/metrics/jobs.hpp"
 #include "redag_analysis/metrics/protobuf.hpp"
 #include "redag_testing/builders.hpp"
-#include "redag_testing/kernel_rows.hpp"
 #include "redag_testing/perfetto_reader.hpp"
 #include "redag_testing/random_workloads.hpp"
 #include "redag_testing/timeline.hpp"
@@ -38,8 +37,8 @@ class Perfetto : public ::testing::Test {
  protected:
   ~Perfetto() override { std::filesystem::remove(path_); }
 
-  Picture picture_of(const trace::Trace &trace, const std::optional<KernelRecord> &kernel = std::nullopt) {
-    const Result<void> written = write_perfetto(path_, trace, kernel);
+  Picture picture_of(const trace::Trace &trace) {
+    const Result<void> written = write_perfetto(path_, trace);
     EXPECT_TRUE(written) << to_string(written.error());
     return testing::read_picture(path_);
   }
@@ -201,56 +200,6 @@ TEST_F(Perfetto, AgreesWithTheJobsOfRandomRuns) {
       EXPECT_EQ(on_worker[key], job.on_worker) << seed << " " << key.first << " " << key.second;
     }
   }
-}
-
-TEST_F(Perfetto, TheKernelsRecordIsOnTheSameClock) {
-  Workload workload = make_workload({make_dag("d", {{"a", 10, 3}})}, 1, PreemptionMode::Os);
-  workload.name = "robot";
-  TraceBuilder t(std::move(workload));
-  t.at(0).arrives("a", 0).dispatched("a", 0, 0, 10).started("a", 0, 0).at(4).finished("a", 0, 0);
-  const std::vector<KernelRow> rows = {KernelProcess{100, "robot"},
-                                       KernelThread{100, "main", 100},
-                                       KernelThread{101, "redag-0", 100},
-                                       KernelThread{7, "rcu-7", 0},
-                                       JobThread{TaskId(0), 0, 101},
-                                       KernelSwitch{-9 * kMs, 1, 0, true, 7, 120},
-                                       KernelSwitch{-5 * kMs, 1, 7, false, 101, 40},
-                                       KernelInterrupt{-3 * kMs, -2 * kMs, 1, "eth0"},
-                                       KernelInterrupt{-kMs, kMs / 2, 1, "eth0"},
-                                       KernelSwitch{kMs, 1, 101, true, 7, 120},
-                                       KernelSwitch{2 * kMs, 1, 7, false, 101, 40},
-                                       KernelInterrupt{3 * kMs, 3 * kMs, 1, "softirq TIMER"},
-                                       KernelSwitch{4 * kMs, 1, 101, false, 0, 120}};
-  const Picture picture = picture_of(t.until(10), testing::kernel_record_of(rows));
-  std::vector<std::string> events;
-  for (const testing::PictureKernelEvent &one : picture.kernel) {
-    std::string line = std::to_string(one.time / kMs) + " " + one.kind;
-    for (const char *field : {"prev_comm", "prev_state", "next_comm", "next_prio", "name", "vec"}) {
-      if (one.fields.contains(field)) line += " " + one.fields.at(field);
-    }
-    EXPECT_EQ(one.cpu, 1U);
-    events.push_back(line);
-  }
-  EXPECT_THAT(events, ElementsAre("0 sched_switch rcu-7 1 redag-0 40", "0 irq_handler_entry eth0", "0 irq_handler_exit",
-                                  "1 sched_switch redag-0 0 rcu-7 120", "2 sched_switch rcu-7 1 redag-0 40",
-                                  "3 softirq_entry 1", "3 softirq_exit 1", "4 sched_switch redag-0 1 swapper/1 120"));
-  EXPECT_EQ(picture.processes.at(100), "robot");
-  EXPECT_EQ(picture.threads.at(101), "redag-0");
-  EXPECT_THAT(texts(picture.slices_of("thread 101")), ElementsAre("a 0-4 job=0"));
-}
-
-// More events than a packet has, with interrupts that the record has after what happened meanwhile.
-TEST_F(Perfetto, TheKernelsEventsOfAProcessorAreInOrder) {
-  TraceBuilder t(make_workload({make_dag("d", {{"a", 10, 3}})}, 1, PreemptionMode::Os));
-  std::vector<KernelRow> rows;
-  for (Time at = 0; at < 5000; ++at) {
-    rows.emplace_back(KernelSwitch{.time = at, .cpu = 0, .from = 1, .to = 2});
-    if (at % 10 == 9) rows.emplace_back(KernelInterrupt{at - 5, at, 0, "eth0"});
-  }
-  const Picture picture = picture_of(t.until(10), testing::kernel_record_of(rows));
-  EXPECT_EQ(picture.kernel.size(), 6000U);
-  EXPECT_TRUE(std::is_sorted(picture.kernel.begin(), picture.kernel.end(),
-                             [](const auto &a, const auto &b) { return a.time < b.time; }));
 }
 
 TEST_F(Perfetto, LongRunsAreWrittenInBlocks) {

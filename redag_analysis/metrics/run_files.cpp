@@ -69,10 +69,6 @@ Diagnostics RunFiles::commit(Time end, std::uint64_t lost_events) {
   return problems;
 }
 
-std::string RunFiles::events_path() const { return path(events_name(options_.events_as_text)); }
-
-std::string RunFiles::picture_path() const { return path(kPictureFile); }
-
 std::string RunFiles::names() const {
   std::string names = jobs_ ? std::string(kJobsFile) + ", " : "";
   names += events_name(options_.events_as_text);

@@ -51,9 +51,6 @@ class RunFiles {
 
   /// The names of the files, once they are complete: "jobs.csv, events.redag".
   [[nodiscard]] std::string names() const;
-  /// The same, in the folder. There is no picture if has_picture() is false.
-  [[nodiscard]] std::string events_path() const;
-  [[nodiscard]] std::string picture_path() const;
   [[nodiscard]] bool has_picture() const { return picture_.has_value(); }
   /// True if the run was too long for Picture::Auto.
   [[nodiscard]] bool lacks_picture() const { return lacks_picture_; }

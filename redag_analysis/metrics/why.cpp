@@ -11,6 +11,8 @@
 #include <unordered_set>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "redag_analysis/metrics/miss.hpp"
 #include "redag_analysis/metrics/why_links.hpp"
 #include "redag_analysis/metrics/why_path.hpp"
@@ -266,7 +268,11 @@ class Investigation::Explainer {
     read_kernel(of_.run().end);
     watch.finish(links);
     settle();
-    read_kernel(kNever);  // an incomplete record is no good one
+    if (kernel_ && kernel && !kernel_->covers(of_.run().start, of_.run().end)) {
+      return make_error(fmt::format("{} has no event of the time of this run", of_.kernel_->path()),
+                        "record it during the run with 'trace-cmd record -C mono -e sched:sched_switch -e irq', and "
+                        "write it with 'trace-cmd report'");
+    }
     return read ? kernel : read;
   }
 

@@ -4,6 +4,7 @@
 #include "redag_analysis/metrics/why_kernel.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 #include <iterator>
 #include <variant>
 
@@ -24,7 +25,7 @@ void push(std::vector<KernelView::Stretch> &out, Cause cause, std::string progra
 }  // namespace
 
 Result<void> KernelView::read_until(Time time) {
-  // Times of the kernel are whole microseconds, and a job is logged a moment after its body began.
+  // Times of the kernel can be whole microseconds.
   constexpr Duration kBeyond = kMillisecond;
   const Time until = time > kNever - kBeyond ? kNever : time + kBeyond;
   while (!is_over_ && last_ <= until) {
@@ -36,18 +37,13 @@ Result<void> KernelView::read_until(Time time) {
     }
     if (const auto *one = std::get_if<KernelSwitch>(&**row)) {
       add(*one);
-    } else if (const auto *interrupt = std::get_if<KernelInterrupt>(&**row)) {
-      interrupts_[interrupt->cpu].push_back(*interrupt);
-      ++kept_;
-    } else if (const auto *loss = std::get_if<KernelLoss>(&**row)) {
-      lost_ += loss->events;
     } else {
-      threads_.add(**row);
+      const KernelInterrupt &interrupt = std::get<KernelInterrupt>(**row);
+      interrupts_[interrupt.cpu].push_back(interrupt);
+      ++kept_;
     }
-    if (const std::optional<Time> at = time_of(**row)) {
-      last_ = *at;
-      if (!first_) first_ = at;
-    }
+    last_ = time_of(**row);
+    if (!begun_) begun_ = first_ = last_;
     if (kept_ > kMostKept) forget();
   }
   return {};
@@ -64,7 +60,8 @@ void KernelView::add(const KernelSwitch &event) {
   }
   slices.push_back({.begin = event.time, .cpu = event.cpu, .thread = event.to, .priority = event.to_priority});
   ++kept_;
-  if (threads_.process_of(event.to) == 0) return;
+  if (event.to != 0) names_[event.to] = event.to_name;
+  if (!is_own(event.to)) return;
   by_thread_[event.to].push_back(slices.back());
   ++kept_;
 }
@@ -106,9 +103,48 @@ void KernelView::forget() {
   first_ = middle;
 }
 
-std::optional<int> KernelView::thread_beside(const JobId &job, const std::string &name) const {
-  const std::optional<int> thread = thread_of(job);
-  return threads_.thread_named(name, thread ? threads_.process_of(*thread) : 0);
+// Threads of executors have names of their own: "redag-0", "redag-timer". That of `redag run` is "redag".
+bool KernelView::is_own(int thread) const {
+  const auto found = names_.find(thread);
+  return found != names_.end() && (found->second == "redag" || found->second.starts_with("redag-"));
+}
+
+std::optional<int> KernelView::thread_of(Time begin, Time end, Duration processor) const {
+  constexpr Duration kResolution = kMicrosecond;
+  const auto runs_at = [](const Slices &slices, Time at) {
+    const auto slice = first_after(slices, at - kResolution - 1);
+    return slice != slices.end() && slice->begin <= at + kResolution;
+  };
+  const auto time_on = [&](const Slices &slices) {
+    Duration sum = 0;
+    for (auto slice = first_after(slices, begin); slice != slices.end() && slice->begin < end; ++slice) {
+      sum += std::min(end, slice->end) - std::max(begin, slice->begin);
+    }
+    return sum;
+  };
+  std::vector<int> found;
+  for (const auto &[thread, slices] : by_thread_) {
+    const auto name = names_.find(thread);
+    const bool is_worker = name != names_.end() && name->second.starts_with("redag-") &&
+                           name->second.find_first_not_of("0123456789", 6) == std::string::npos;
+    if (is_worker && runs_at(slices, begin) && runs_at(slices, end)) found.push_back(thread);
+  }
+  if (found.size() > 1 && processor != kNever) {
+    const Duration tolerance = 20 * kMicrosecond + processor / 50;
+    std::erase_if(found, [&](int thread) { return std::abs(time_on(by_thread_.at(thread)) - processor) > tolerance; });
+  }
+  return found.size() == 1 ? std::optional(found.front()) : std::nullopt;
+}
+
+std::optional<int> KernelView::thread_named(const std::string &name) const {
+  std::optional<int> only;
+  for (const auto &[thread, slices] : by_thread_) {
+    const auto found = names_.find(thread);
+    if (found == names_.end() || found->second != name) continue;
+    if (only) return std::nullopt;
+    only = thread;
+  }
+  return only;
 }
 
 std::vector<KernelView::Stretch> KernelView::follow(int thread, Time begin, Time end) const {
@@ -171,11 +207,17 @@ void KernelView::occupants(int cpu, int priority, Time begin, Time end, std::vec
       const Time from = std::max(at, slice->begin);
       const Time to = std::min(end, slice->end);
       const bool throttled = is_realtime_priority(priority) && !is_realtime_priority(slice->priority);
-      const Cause cause = slice->thread == 0                        ? Cause::Unknown
-                          : threads_.process_of(slice->thread) != 0 ? Cause::OwnThread
-                          : throttled                               ? Cause::Throttled
-                                                                    : Cause::OtherProgram;
-      push(out, cause, cause == Cause::Unknown ? std::string() : threads_.name_of(slice->thread), from, to);
+      const Cause cause = slice->thread == 0      ? Cause::Unknown
+                          : is_own(slice->thread) ? Cause::OwnThread
+                          : throttled             ? Cause::Throttled
+                                                  : Cause::OtherProgram;
+      std::string program;
+      if (cause != Cause::Unknown) {
+        const auto name = names_.find(slice->thread);
+        program = name == names_.end() ? "thread" : name->second;
+        if (cause != Cause::OwnThread) program += "-" + std::to_string(slice->thread);
+      }
+      push(out, cause, std::move(program), from, to);
       at = std::max(at, to);
     }
   }

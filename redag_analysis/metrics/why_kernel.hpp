@@ -11,10 +11,10 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "redag_analysis/metrics/kernel_record.hpp"
-#include "redag_analysis/metrics/kernel_threads.hpp"
 #include "redag_analysis/metrics/why_cause.hpp"
 
 namespace redag::metrics {
@@ -34,16 +34,18 @@ class KernelView {
   /// Reads on, a little beyond `time`. The other functions know what happened until then. Error: a damaged file.
   [[nodiscard]] Result<void> read_until(Time time);
 
-  /// How many events the kernel dropped, as far as the record was read.
-  [[nodiscard]] std::uint64_t lost() const { return lost_; }
+  /// How many events are missing, as far as the record was read.
+  [[nodiscard]] std::uint64_t lost() const { return reader_.lost(); }
 
-  /// The thread that ran a job's body, if it was recorded.
-  [[nodiscard]] std::optional<int> thread_of(const JobId &job) const {
-    return threads_.thread_of(job.task, job.number);
-  }
+  /// Returns true if the record, as far as it was read, has an event in [begin, end].
+  [[nodiscard]] bool covers(Time begin, Time end) const { return begun_ && *begun_ <= end && last_ >= begin; }
 
-  /// The thread with this name in the process that ran the job, if it is the only one.
-  [[nodiscard]] std::optional<int> thread_beside(const JobId &job, const std::string &name) const;
+  /// The thread that ran a body in [begin, end): the only worker thread with a processor at both ends. Of several the
+  /// only one that used this much processor time; kNever: not known.
+  [[nodiscard]] std::optional<int> thread_of(Time begin, Time end, Duration processor) const;
+
+  /// The executor's thread with this name, if it is the only one.
+  [[nodiscard]] std::optional<int> thread_named(const std::string &name) const;
 
   /// Returns what the thread did in [begin, end), without gaps.
   [[nodiscard]] std::vector<Stretch> follow(int thread, Time begin, Time end) const;
@@ -67,6 +69,7 @@ class KernelView {
   using Slices = std::deque<Slice>;
 
   void add(const KernelSwitch &event);
+  [[nodiscard]] bool is_own(int thread) const;
   static void end_last(Slices &slices, const KernelSwitch &event, bool is_whole);
   void end();
   void forget();
@@ -74,14 +77,14 @@ class KernelView {
   void executed(const Slice &slice, Time begin, Time end, std::vector<Stretch> &out) const;
 
   KernelReader reader_;
-  KernelThreads threads_;
+  std::unordered_map<int, std::string> names_;
   std::map<int, Slices> by_cpu_;
-  std::map<int, Slices> by_thread_;  // those of processes that ran jobs
+  std::map<int, Slices> by_thread_;  // those of the executor's threads
   std::map<int, std::deque<KernelInterrupt>> interrupts_;
+  std::optional<Time> begun_;  // of the first row
   std::optional<Time> first_;  // the earliest time that is kept
-  Time last_ = 0;              // of the last row with a time
+  Time last_ = 0;              // of the last row
   std::size_t kept_ = 0;
-  std::uint64_t lost_ = 0;
   bool is_over_ = false;
 };
 

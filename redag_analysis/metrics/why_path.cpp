@@ -141,7 +141,7 @@ void WhyPath::late_release(const LinkedJob &job, Time begin, Time end) {
     add(job, {Cause::HandOver, {}, begin, end}, begin, end);
     return;
   }
-  const std::optional<int> timer = kernel_ == nullptr ? std::nullopt : kernel_->thread_beside(job.id(), kTimerThread);
+  const std::optional<int> timer = kernel_ == nullptr ? std::nullopt : kernel_->thread_named(kTimerThread);
   if (!timer) {
     add(job, {Cause::ReleaseLate, {}, begin, end}, begin, end);
     return;
@@ -153,7 +153,8 @@ void WhyPath::late_release(const LinkedJob &job, Time begin, Time end) {
 }
 
 std::optional<int> WhyPath::thread_of(const LinkedJob &job) const {
-  return kernel_ == nullptr ? std::nullopt : kernel_->thread_of(job.id());
+  if (kernel_ == nullptr || job.record.start == kNever) return std::nullopt;
+  return kernel_->thread_of(job.record.start, links_.end_of(job), job.record.processor);
 }
 
 // What the job did while it had a worker. `used` is what it has executed.

@@ -81,8 +81,11 @@ std::string advice(Cause cause, const Setting &at) {
     case Cause::Waited: return "shorten the wait, or lengthen the deadline";
     case Cause::OffProcessor:
     case Cause::Unknown:
-      return "record with redag run --kernel, which names other programs, interrupts and waits of the body";
-    case Cause::OnWorker: return fmt::format("shorten {}, or record with redag run --kernel to see what it did", x);
+      return "give redag why the kernel's record with --kernel, which names other programs, interrupts and waits of "
+             "the "
+             "body";
+    case Cause::OnWorker:
+      return fmt::format("shorten {}, or give redag why the kernel's record with --kernel to see what it did", x);
     case Cause::OtherProgram:
       return fmt::format("keep {} off the processors of the workers (isolated processors, cpusets, taskset)", x);
     case Cause::OwnThread: return fmt::format("give {} another processor or a lower priority than the workers", x);

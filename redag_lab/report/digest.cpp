@@ -36,15 +36,15 @@ bool Group::fits(const trace::RunInfo &run) const {
          trace::worker_count(run) == trace::worker_count(info()) && same_tasks(run.workload, workload());
 }
 
-Result<void> Group::add(const std::string &path, const trace::Recording &run,
-                        const std::optional<metrics::KernelRecord> &kernel) {
+Result<void> Group::add(const std::string &path, const trace::Recording &run) {
   REDAG_CHECK(fits(run.info()), "jobs of different runs counted together");
   const bool is_first = runs_.empty();
   if (is_first) begin(run.info());
   Timeline timeline;
   Result<RunDigest> digest = read(path, run, timeline);
   if (!digest) return tl::unexpected<Diagnostics>(std::move(digest.error()));
-  const Result<metrics::Investigation> investigation = metrics::Investigation::of(run, kernel, options_.most_explained);
+  const Result<metrics::Investigation> investigation =
+      metrics::Investigation::of(run, std::nullopt, options_.most_explained);
   if (!investigation) return tl::unexpected<Diagnostics>(investigation.error());
   if (is_worst(*investigation)) {
     const std::vector<metrics::Subject> closest = investigation->closest(1);

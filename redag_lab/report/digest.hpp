@@ -60,11 +60,9 @@ class Group {
   /// Starts without runs. Call add() before any other function.
   Group(std::string label, const DigestOptions &options) : label_(std::move(label)), options_(options) {}
 
-  /// Adds a run. The worst run provides the schedule, the timeline and the explanations, for which `kernel` is the
-  /// kernel's record of it, if there is one. Requires fits(run.info()). Error: a damaged file; the group is then of no
-  /// further use.
-  [[nodiscard]] Result<void> add(const std::string &path, const trace::Recording &run,
-                                 const std::optional<metrics::KernelRecord> &kernel = std::nullopt);
+  /// Adds a run. The worst run provides the schedule, the timeline and the explanations. Requires fits(run.info()).
+  /// Error: a damaged file; the group is then of no further use.
+  [[nodiscard]] Result<void> add(const std::string &path, const trace::Recording &run);
   /// True if executor, mode and tasks are those of the group, whose jobs can then be counted together.
   [[nodiscard]] bool fits(const trace::RunInfo &info) const;
   /// Sorts, and computes the figures of all runs together. Call it after the last add().

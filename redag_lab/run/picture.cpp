@@ -11,8 +11,8 @@
 namespace redag::lab {
 
 Result<void> draw_picture(trace::EventsReader &events, const std::string &picture,
-                          const std::optional<metrics::KernelRecord> &kernel, const std::function<bool()> &is_stopped) {
-  Result<metrics::PerfettoWriter> writer = metrics::PerfettoWriter::create(picture, events.info(), kernel);
+                          const std::function<bool()> &is_stopped) {
+  Result<metrics::PerfettoWriter> writer = metrics::PerfettoWriter::create(picture, events.info());
   if (!writer) return tl::unexpected<Diagnostics>(std::move(writer.error()));
   std::vector<JobEvent> batch;
   for (;;) {

@@ -9,7 +9,6 @@
 
 #include "redag/base/result.hpp"
 #include "redag/trace/events_file.hpp"
-#include "redag_analysis/metrics/kernel_record.hpp"
 
 namespace redag::lab {
 
@@ -17,7 +16,6 @@ namespace redag::lab {
 /// with the run. `is_stopped` is asked now and then: no picture is written once it is true, which
 /// is an error.
 [[nodiscard]] Result<void> draw_picture(trace::EventsReader &events, const std::string &picture,
-                                        const std::optional<metrics::KernelRecord> &kernel,
                                         const std::function<bool()> &is_stopped);
 
 }  // namespace redag::lab

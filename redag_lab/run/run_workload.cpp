@@ -252,7 +252,7 @@ class Run {
       if (Result<void> started = instance->engine->start(); !started) return started;
     }
     origin_ = runtime::monotonic_now() + kStartMargin;
-    if (options_.on_start) options_.on_start(result_.trace.info, origin_);
+    result_.trace.info.origin = origin_;
     for (const auto &instance : instances_) {
       if (Result<void> started = start(*instance); !started) return started;
     }

@@ -59,8 +59,6 @@ struct RunOptions {
   std::string flight;
   trace::FlightOptions flight_options;
   const std::atomic<bool> *stop = nullptr;  // ends the run early when set (Ctrl-C)
-  /// Called once, before the first release, on the calling thread. `origin` is CLOCK_MONOTONIC at time 0 of the trace.
-  std::function<void(const trace::RunInfo &info, Time origin)> on_start;
   /// Takes the new events about ten times a second, in the order of the trace, on the calling thread. The result's
   /// trace then holds none, and memory does not grow with the run. `info` is that of the result, except `end` and
   /// `lost_events`.

@@ -19,7 +19,6 @@
 #include "redag_analysis/analyze/executors.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"
-#include "redag_lab/run/kernel_recorder.hpp"
 #include "redag_lab/run/run_workload.hpp"
 
 namespace redag::lab {
@@ -226,18 +225,6 @@ std::vector<Duration> bounds_of(const Workload &workload, const Variant &variant
   return bounds;
 }
 
-/// Returns the bodies with a note of the thread that begins each job.
-std::vector<runtime::Body> logged(std::vector<runtime::Body> &bodies, KernelRecorder &kernel) {
-  std::vector<runtime::Body> out;
-  for (std::size_t t = 0; t < bodies.size(); ++t) {
-    out.push_back([t, &kernel, body = std::move(bodies[t])](const runtime::Job &job) {
-      kernel.log(TaskId(t), job.number);
-      return body(job);
-    });
-  }
-  return out;
-}
-
 Result<Session> run_on_threads(const Workload &workload, const Variant &variant, const SessionOptions &options,
                                const ProgressHook &progress) {
   RunOptions run;
@@ -260,17 +247,6 @@ Result<Session> run_on_threads(const Workload &workload, const Variant &variant,
   run.scheduler = [&](const Workload &w, const sched::Config &config) {
     return executors::make_scheduler(variant.executor, w, config);
   };
-  std::unique_ptr<KernelRecorder> kernel;
-  Result<void> kernel_file;
-  if (options.kernel) {
-    Result<std::unique_ptr<KernelRecorder>> started = KernelRecorder::start(runtime::usable_cpus());
-    if (!started) return tl::unexpected<Diagnostics>(std::move(started.error()));
-    kernel = *std::move(started);
-    run.on_start = [&](const trace::RunInfo &info, Time origin) {
-      kernel_file = kernel->write_to(fmt::format("{}/{}", options.files.folder, metrics::kKernelFile), info, origin);
-    };
-    run.bodies = [&kernel](std::vector<runtime::Body> bodies, const Now &) { return logged(bodies, *kernel); };
-  }
   const auto is_realtime_run = [&run](const trace::RunInfo &info) {
     return run.realtime_threads || info.preemption == to_string(PreemptionMode::Os);
   };
@@ -283,7 +259,6 @@ Result<Session> run_on_threads(const Workload &workload, const Variant &variant,
   Session session;
   std::optional<Evaluation> evaluation;
   run.sink = [&](const trace::RunInfo &info, std::span<const JobEvent> events) {
-    if (kernel && kernel_file) kernel->collect();
     if (!evaluation) evaluation.emplace(session, charged(info), options, false);
     evaluation->add(events);
   };
@@ -298,8 +273,6 @@ Result<Session> run_on_threads(const Workload &workload, const Variant &variant,
   }
   evaluation->finish(charged(std::move(result->trace.info)));
   if (!evaluation->problems().empty()) return tl::unexpected<Diagnostics>(evaluation->problems());
-  if (!kernel_file) return tl::unexpected<Diagnostics>(std::move(kernel_file.error()));
-  if (kernel) session.kernel.emplace(kernel->stop());
   session.realtime_threads = realtime_threads;
   session.stopped = result->stopped;
   session.warnings = std::move(result->warnings);

@@ -19,7 +19,6 @@
 #include "redag/trace/flight_recorder.hpp"
 #include "redag/trace/trace.hpp"
 #include "redag_analysis/metrics/check_report.hpp"
-#include "redag_analysis/metrics/kernel_record.hpp"
 #include "redag_analysis/metrics/run_files.hpp"
 #include "redag_analysis/metrics/summary.hpp"
 #include "redag_analysis/sim/simulator.hpp"
@@ -50,7 +49,6 @@ struct SessionOptions {
   bool live = false;   // publishes a live page for `redag top`
   std::string flight;  // folder for a record of the run that outlives the process; empty: none
   std::uint64_t flight_bytes = trace::FlightOptions{}.most_bytes;
-  bool kernel = false;    // records the kernel's switches and interrupts in files.folder; an error if it refuses
   Duration watchdog = 0;  // reports jobs that run for longer to `on_overdue` at once; 0: off
   std::function<void(const std::string &text)> on_overdue;
 };
@@ -60,18 +58,17 @@ using ProgressHook = std::function<void(Time now, const std::vector<std::uint64_
 
 struct Session {
   trace::RunInfo info;
-  metrics::Summary summary;                     // of the whole run
-  trace::Trace trace;                           // its first events: at most kMostKeptEvents
-  std::uint64_t checked = 0;                    // its events that were checked and written; all of them unless cut_at
-  std::optional<Time> cut_at;                   // `max_events` was reached: they are those of a run that ended here
-  metrics::CheckReport check;                   // of these events
-  std::unique_ptr<metrics::RunFiles> files;     // of SessionOptions::files, not yet complete
-  std::optional<metrics::KernelWriter> kernel;  // the record of SessionOptions::kernel, not yet complete
-  bool realtime_threads = false;                // the jobs ran on SCHED_FIFO threads
-  std::uint64_t events = 0;                     // of the whole run
-  Duration elapsed = 0;                         // wall-clock time of the run and its evaluation
-  bool stopped = false;                         // ended by `stop`
-  std::vector<std::string> warnings;            // caveats for a reader of the figures
+  metrics::Summary summary;                  // of the whole run
+  trace::Trace trace;                        // its first events: at most kMostKeptEvents
+  std::uint64_t checked = 0;                 // its events that were checked and written; all of them unless cut_at
+  std::optional<Time> cut_at;                // `max_events` was reached: they are those of a run that ended here
+  metrics::CheckReport check;                // of these events
+  std::unique_ptr<metrics::RunFiles> files;  // of SessionOptions::files, not yet complete
+  bool realtime_threads = false;             // the jobs ran on SCHED_FIFO threads
+  std::uint64_t events = 0;                  // of the whole run
+  Duration elapsed = 0;                      // wall-clock time of the run and its evaluation
+  bool stopped = false;                      // ended by `stop`
+  std::vector<std::string> warnings;         // caveats for a reader of the figures
 };
 
 /// Runs a session. `workload` must be valid. Errors: resources that the machine refused, an unwritable folder.

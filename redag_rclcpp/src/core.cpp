@@ -578,6 +578,7 @@ redag::trace::RunInfo ReDAGExecutor::Core::run_info(std::vector<std::uint32_t> &
   info.stepped = true;  // between spins no job starts, and some spin functions run one job at a time
   info.end = engine_->now();
   info.settled = engine_->settled();
+  info.origin = origin_;
   info.lost_events = engine_->lost_events();
   info.machine = redag::trace::this_machine();
   info.provenance = redag::current_provenance();

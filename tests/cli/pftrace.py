@@ -52,11 +52,8 @@ class Picture:
         texts = {}
         self.tracks = {}
         self.events = []  # (track, type, name, arguments)
-        self.kernel_events = 0
         for packet in packets(path.read_bytes()):
             for number, value in packet:
-                if number == 1:
-                    self.kernel_events += sum(1 for field, _ in fields(value) if field == 2)
                 if number == 12:
                     for kind, entry in fields(value):
                         entry = dict(fields(entry))

@@ -2,33 +2,16 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Tests `redag why`: its screens and JSON, mistakes, and with `run --kernel` a real program that takes the processor.
+"""Tests `redag why`: its screens and JSON, mistakes, and the kernel's record beside a run on threads.
 
 Usage: why.py PROGRAM SOURCE_DIR. Uses the standard library only.
 """
 import json
-import os
-import pathlib
 import re
-import subprocess
 import sys
 
 from program import CART, SOURCE, Case, in_terminal, main, redag
 
-# Takes processor CPU at a high real-time priority for 6 ms of every 33 ms, until it is killed: it comes at another phase
-# of a period of 10 ms each time, so that some jobs are late because of it wherever it begins.
-HOG = """\
-import ctypes, os, sys, time
-os.sched_setaffinity(0, {int(sys.argv[1])})
-os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(90))
-ctypes.CDLL(None).prctl(15, b"the-hog", 0, 0, 0)
-print("ready", flush=True)
-while True:
-    end = time.monotonic() + 0.006
-    while time.monotonic() < end:
-        pass
-    time.sleep(0.027)
-"""
 PID = """\
 name: pid
 platform: {workers: 1, preemption: none}
@@ -114,10 +97,7 @@ class Why(Case):
         self.expect(redag("why", folder, "control.contoller"), 2, "did you mean 'control.controller'?")
         self.expect(redag("why", folder, "control.controller#9999"), 2, "its jobs are 0 to")
         self.expect(redag("why", folder, "control.controller#x"), 2, "has no job 'x'")
-        record = folder / "kernel.jsonl.gz"
-        record.write_text("nonsense\n")
-        self.expect(redag("why", folder), 2, "kernel.jsonl.gz:1", "not a kernel's record")
-        record.unlink()
+        self.expect(redag("why", folder, "--kernel", self.cart), 2, "does not say when it was")
         for command in ("why", "events", "check-trace", "report"):
             self.expect(redag(command, self.cart), 2, "this is a workload, and not a recorded run", "redag simulate")
 
@@ -140,39 +120,31 @@ class Why(Case):
         self.expect(redag("why", many), 2, "holds 8 runs", f"name one of them, such as '{many / 'mte'}")
 
     def test_the_kernels_record_names_the_other_program(self):
-        cpu = max(os.sched_getaffinity(0))
-        run = ["run", self.write("pid.yaml", PID), "--duration", "1s", "--affinity", str(cpu), "--kernel", "--out",
-               self.folder / "result"]
-        if not re.search(r" tracefs ", pathlib.Path("/proc/self/mounts").read_text()):
-            self.expect(redag(*run), 2, "there is no tracefs", "mount -t tracefs")
-            self.skipTest("no tracefs is mounted")
-        with subprocess.Popen([sys.executable, "-c", HOG, str(cpu)], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as hog:
-            try:
-                if hog.stdout.readline() != b"ready\n":
-                    self.skipTest("this process may not use SCHED_FIFO")
-                result = redag(*run)
-            finally:
-                hog.kill()
-        if "does not record for this process" in result.stderr:
-            self.expect(result, 2, "run as root")
-            self.skipTest("this process may not use tracefs")
-        self.expect(result, 0)
-        document = self.document(redag("why", self.folder / "result", "--json"), "redag.why/1")
-        for job in document["jobs"]:
-            self.assertEqual(sum(part["length_ns"] for part in job["parts"]), job["length_ns"])
-        named = [cause for cause in document["causes"] if (cause["program"] or "").startswith("the-hog-")]
-        self.assertEqual([cause["cause"] for cause in named], ["other_program"], document["causes"])
-        self.assertGreater(named[0]["jobs"], 0)
-        # A record of another run is not used.
-        events = self.folder / "result" / "events.jsonl"
-        self.expect(redag("events", events.parent, "-o", events), 0)
-        (events.parent / "events.redag").unlink()
-        first, rest = events.read_text().split("\n", 1)
-        header = json.loads(first)
-        header["run" if "provenance" not in header else "provenance"]["command"] = "another"
-        events.write_text(json.dumps(header) + "\n" + rest)
-        text = self.expect(redag("why", self.folder / "result"), 0).stdout
-        self.assertNotIn("the-hog", text)
+        """The text is as trace-cmd would have written it, had the hog taken the middle of a job."""
+        folder, record = self.folder / "result", self.folder / "kernel.txt"
+        self.expect(redag("run", self.write("pid.yaml", PID), "--duration", "300ms", "--out", folder), 0)
+        events = self.expect(redag("events", folder), 0).stdout
+        origin = json.loads(events.split("\n", 1)[0])["run"]["origin_ns"]
+        job = next(row for row in self.jobs(folder) if row["job"] == "7")
+        start, finish = int(job["start_ns"]), int(job["finish_ns"])
+        third = (finish - start) // 3
+        switches = [(start - 20_000, "swapper/0:0 [120] R", "redag-0:77 [120]"),
+                    (start + third, "redag-0:77 [120] R", "the-hog:99 [9]"),
+                    (finish - third, "the-hog:99 [9] S", "redag-0:77 [120]"),
+                    (finish + 20_000, "redag-0:77 [120] S", "swapper/0:0 [120]")]
+        lines = [f"  x-1  [000]  {(origin + at) // 10**9}.{(origin + at) % 10**9:09}: sched_switch:  {a} ==> {b}\n"
+                 for at, a, b in switches]
+        record.write_text("".join(lines))
+        why = ["why", folder, "control.pid#7", "--json", "--kernel", record]
+        document = self.document(redag(*why), "redag.why/1")
+        parts = document["jobs"][0]["parts"]
+        self.assertEqual(sum(part["length_ns"] for part in parts), document["jobs"][0]["length_ns"])
+        hog = [part for part in parts if part["program"] == "the-hog-99"]
+        self.assertEqual([part["cause"] for part in hog], ["other_program"], parts)
+        self.assertAlmostEqual(hog[0]["length_ns"], third, delta=2)
+        record.write_text("nonsense\n")
+        self.expect(redag(*why), 2, "has no event of the time of this run", "trace-cmd record -C mono")
+        self.expect(redag(*why[:-1], self.folder / "none"), 2, "none")
 
 
 if __name__ == "__main__":

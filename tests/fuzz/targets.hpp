@@ -21,7 +21,7 @@ void plan_target(std::string_view input);
 void trace_target(std::string_view input);
 /// Reads events.redag.
 void events_target(std::string_view input);
-/// Reads kernel.jsonl.
+/// Reads the text of a kernel's record, and follows threads in it.
 void kernel_record_target(std::string_view input);
 /// Reads jobs.csv.
 void jobs_csv_target(std::string_view input);

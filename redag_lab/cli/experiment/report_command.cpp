@@ -10,7 +10,6 @@
 #include "redag/base/text.hpp"
 #include "redag/trace/output_file.hpp"
 #include "redag/trace/recording.hpp"
-#include "redag_analysis/metrics/kernel_record.hpp"
 #include "redag_lab/cli/experiment/acceptance_page.hpp"
 #include "redag_lab/cli/run/recorded_runs.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
@@ -96,13 +95,7 @@ class Reporting {
               "name folders that hold one kind of run each");
           return false;
         }
-        const Result<std::optional<metrics::KernelRecord>> kernel = metrics::KernelRecord::beside(file, trace->info());
-        if (!kernel) {
-          progress_.clear();
-          console_.note(kernel.error());
-          return false;
-        }
-        const Result<void> added = group.add(fs::path(file).parent_path().string(), *trace, *kernel);
+        const Result<void> added = group.add(fs::path(file).parent_path().string(), *trace);
         if (!added) {
           progress_.clear();
           console_.note(added.error());

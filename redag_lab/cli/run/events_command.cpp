@@ -155,10 +155,7 @@ Result<void> convert(const EventsOptions &options, Console &console) {
   if (!reader) return tl::unexpected<Diagnostics>(std::move(reader.error()));
   const InterruptGuard guard;
   if (options.format == Format::Perfetto) {
-    const Result<std::optional<metrics::KernelRecord>> kernel =
-        metrics::KernelRecord::beside(chosen->file, reader->info());
-    if (!kernel) return tl::unexpected<Diagnostics>(kernel.error());
-    return lab::draw_picture(*reader, options.output, *kernel, InterruptGuard::interrupted);
+    return lab::draw_picture(*reader, options.output, InterruptGuard::interrupted);
   }
   const Result<std::unique_ptr<Converter>> converter = converter_for(options, *reader, console);
   if (!converter) return tl::unexpected<Diagnostics>(converter.error());

@@ -264,7 +264,6 @@ std::optional<lab::SessionOptions> session_options(const RunArguments &arguments
   options.realtime_threads = arguments.realtime_threads;
   options.spin = arguments.spin;
   options.live = arguments.live;
-  options.kernel = arguments.kernel;
   options.watchdog = arguments.watchdog.value_or(0);
   if (options.duration > trace::kMaxTraceTime) {
     console.error(fmt::format("a run of {} is longer than a trace can record", format_duration(options.duration)),

@@ -45,7 +45,6 @@ struct RunArguments {
   bool events_as_text = false;
   bool jobs = true;
   metrics::Picture picture = metrics::Picture::Auto;
-  bool kernel = false;
   bool flight = false;  // records the run in `folder` while it runs
   std::uint32_t flight_mib = static_cast<std::uint32_t>(trace::FlightOptions{}.most_bytes >> 20U);
   bool force = false;

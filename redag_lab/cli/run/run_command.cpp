@@ -31,10 +31,6 @@ Action add_run(CLI::App &app) {
   app.add_flag("--live,!--no-live", arguments->live,
                "Let 'redag top' show the run; costs a page of memory and two updates a second")
       ->group("Threads");
-  app.add_flag("--kernel", arguments->kernel,
-               "Record the kernel's context switches and interrupts too, so that 'redag why' names other programs")
-      ->needs(&option_named(app, "--out"))
-      ->group("Results");
   arguments->flight = true;
   app.add_flag("--flight,!--no-flight", arguments->flight,
                "With --out, record events during the run, so that 'redag recover' can restore a killed run")

@@ -245,27 +245,10 @@ Json to_json(const lab::Session &session) {
   return document;
 }
 
-namespace {
-
-// Draws a picture again, with the kernel's record beside the events.
-Result<void> draw_with_kernel(const metrics::RunFiles &files) {
-  Result<trace::EventsReader> events = trace::EventsReader::open(files.events_path());
-  if (!events) return tl::unexpected<Diagnostics>(std::move(events.error()));
-  const Result<std::optional<metrics::KernelRecord>> kernel =
-      metrics::KernelRecord::beside(files.events_path(), events->info());
-  if (!kernel) return tl::unexpected<Diagnostics>(kernel.error());
-  return lab::draw_picture(*events, files.picture_path(), *kernel, [] { return false; });
-}
-
-}  // namespace
-
 WrittenFiles write_session(lab::Session &session, const metrics::FilesOptions &options) {
   WrittenFiles written;
   const auto keep = [&written](const Diagnostics &problems) {
     written.problems.insert(written.problems.end(), problems.begin(), problems.end());
-  };
-  const auto keep_if_failed = [&keep](const Result<void> &result) {
-    if (!result) keep(result.error());
   };
   if (!session.files) {
     Result<metrics::RunFiles> files = metrics::RunFiles::create(options, session.trace.info);
@@ -276,7 +259,9 @@ WrittenFiles write_session(lab::Session &session, const metrics::FilesOptions &o
       keep(files.error());
     }
   }
-  keep_if_failed(metrics::write_summary(options.folder + "/summary.json", session.summary, session.info));
+  const std::string summary = options.folder + "/summary.json";
+  if (const Result<void> done = metrics::write_summary(summary, session.summary, session.info); !done)
+    keep(done.error());
   if (session.files) {
     keep(session.files->commit(session.cut_at.value_or(session.info.end), session.info.lost_events));
     written.names = "summary.json, " + session.files->names();
@@ -287,12 +272,6 @@ WrittenFiles write_session(lab::Session &session, const metrics::FilesOptions &o
           "('redag events {1} --format perfetto -o {1}/trace.pftrace' makes one)\n",
           format_count(metrics::kMostPicturedEvents), options.folder);
     }
-  }
-  if (session.kernel) {
-    keep_if_failed(session.kernel->commit());
-    written.names += fmt::format(", {}", metrics::kKernelFile);
-    // What the kernel did is known only now.
-    if (written.has_picture && written.problems.empty()) keep_if_failed(draw_with_kernel(*session.files));
   }
   return written;
 }

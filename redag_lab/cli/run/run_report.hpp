@@ -35,8 +35,8 @@ struct WrittenFiles {
   std::string no_picture;  // why there is no trace.pftrace; empty: there is one, or none was wanted
 };
 
-/// Completes session.files, or writes such files of session.trace, and adds summary.json and kernel.jsonl. The folder
-/// must exist. Continues after a failure.
+/// Completes session.files, or writes such files of session.trace, and adds summary.json. The folder must exist.
+/// Continues after a failure.
 [[nodiscard]] WrittenFiles write_session(lab::Session &session, const metrics::FilesOptions &options);
 
 }  // namespace redag::cli

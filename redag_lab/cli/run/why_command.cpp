@@ -28,6 +28,7 @@ constexpr std::size_t kClosest = 5;  // explained where no deadline was missed
 struct WhyOptions {
   std::string place;
   std::string job;
+  std::string kernel;
   bool end_to_end = false;
   bool all = false;
   bool json = false;
@@ -52,7 +53,7 @@ class Explaining {
     const std::string &file = chosen->file;
     const Result<trace::Recording> trace = trace::Recording::open(file);
     if (!trace) return tl::unexpected<Diagnostics>(trace.error());
-    const Result<std::optional<metrics::KernelRecord>> kernel = metrics::KernelRecord::beside(file, trace->info());
+    const Result<std::optional<metrics::KernelRecord>> kernel = kernel_record(trace->info());
     if (!kernel) return tl::unexpected<Diagnostics>(kernel.error());
     if (trace->info().lost_events > 0) {
       console_.warn(fmt::format("{} events of this run were lost: explanations can be wrong",
@@ -61,6 +62,17 @@ class Explaining {
     const Result<metrics::Investigation> investigation = metrics::Investigation::of(*trace, *kernel, kMostExplained);
     if (!investigation) return tl::unexpected<Diagnostics>(investigation.error());
     return options_.job.empty() ? explain_run(*investigation) : explain_job(*investigation);
+  }
+
+  Result<std::optional<metrics::KernelRecord>> kernel_record(const trace::RunInfo &run) const {
+    if (options_.kernel.empty()) return std::optional<metrics::KernelRecord>();
+    if (!run.origin) {
+      return make_error("--kernel: this run does not say when it was, on the kernel's clock",
+                        "runs on threads of this version say it, and simulations do not");
+    }
+    Result<metrics::KernelRecord> record = metrics::KernelRecord::open(options_.kernel, *run.origin);
+    if (!record) return tl::unexpected<Diagnostics>(std::move(record.error()));
+    return std::optional<metrics::KernelRecord>(*std::move(record));
   }
 
   Result<int> explain_run(const metrics::Investigation &investigation) {
@@ -126,7 +138,7 @@ class Explaining {
     if (!lost) return tl::unexpected<Diagnostics>(lost.error());
     if (*lost == 0) return {};
     console_.warn(
-        fmt::format("the kernel dropped {} of its events: other programs can be missing", format_count(*lost)));
+        fmt::format("the kernel's record lacks {} events: other programs can be missing", format_count(*lost)));
     return {};
   }
 
@@ -179,6 +191,10 @@ Action add_why(CLI::App &app) {
   app.add_flag("--end-to-end", options->end_to_end,
                "Explain the time since the release of the source whose data the job carries")
       ->needs(job);
+  app.add_option(
+         "--kernel", options->kernel,
+         "The kernel's record of the same time, as text of trace-cmd report or perf script: names other programs")
+      ->type_name("FILE");
   app.add_flag("--all", options->all, "Show every miss, or every part of JOB, however many there are");
   app.add_flag("--json", options->json, "Write one JSON document, and nothing else, to standard output");
   return [options](Console &console) { return Explaining(*options, console).run(); };

@@ -138,7 +138,7 @@ bool is_result_name(std::string_view name) {
                                                        "shards",
                                                        "merged",
                                                        "logs",
-                                                       "kernel.jsonl",  // of earlier versions
+                                                       "kernel.jsonl",  // of earlier versions, as the next one
                                                        "kernel.jsonl.gz"};
   if (std::find(kNames.begin(), kNames.end(), name) != kNames.end()) return true;
   // Folders of a comparison (executors, and repetitions below them), and the files of `generate`.
