@@ -86,8 +86,8 @@ redag_package(redag_tools redag-tools devel
   "Program that simulates, runs, analyses and compares callback DAGs"
 "The program redag validates workloads of callback DAGs, runs them in virtual
 time or on threads, bounds response times, compares executors and explains
-missed deadlines. Manual pages, completions of bash, zsh and fish, workloads,
-robots and their schemas are included."
+missed deadlines. Completion in bash, workloads, robots and their schemas are
+included."
   "libredag${soname_version} ${this_version}" "libredag-analysis${soname_version} ${this_version}")
 # CPack's own scripts call ldconfig. Policy 8.1.1 asks for this trigger.
 foreach(library IN ITEMS LIBREDAG LIBREDAG_ANALYSIS)

@@ -152,7 +152,7 @@ class Examples(Case):
             return "no right to use SCHED_FIFO"
         if "--affinity" in example and len(os.sched_getaffinity(0)) < 2:
             return "two processors are needed"
-        for tool in ("jq", "man", "script"):
+        for tool in ("jq", "script"):
             if re.search(rf"(?:\| |^){tool} ", example) and not shutil.which(tool):
                 return f"{tool} is not installed"
         return None

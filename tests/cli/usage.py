@@ -14,7 +14,7 @@ import subprocess
 from program import CART, MISTAKEN, PROGRAM, SOURCE, Case, main, redag
 
 COMMANDS = [["validate"], ["generate"], ["simulate"], ["run"], ["calibrate"], ["compare"], ["diff"], ["analyze"], ["sensitivity"], ["assign"], ["tune"],
-            ["check-trace"], ["recover"], ["events"], ["why"], ["top"], ["serve"], ["report"], ["completion"], ["man"], ["experiment"], ["experiment", "acceptance"],
+            ["check-trace"], ["recover"], ["events"], ["why"], ["top"], ["serve"], ["report"], ["experiment"], ["experiment", "acceptance"],
             ["experiment", "factorial"], ["experiment", "merge"], ["experiment", "cost"], ["experiment", "submit"]]
 
 
@@ -61,7 +61,6 @@ class Usage(Case):
                 self.assertTrue(any(re.search(rf"{option}\b", text) for text in texts), (heading and heading[1], option))
 
     def test_mistakes_are_near_something(self):
-        self.expect(redag("completion", "tcsh"), 2, "'tcsh' is not a valid choice (one of bash, zsh, fish)")
         self.expect(redag("simualte", self.cart), 2, "did you mean 'simulate'?")
         self.expect(redag("simulate", self.cart, "--durtion", "1s"), 2, "did you mean '--duration'?")
         self.expect(redag("simulate", self.cart, "--policy", "rate_monotonc"), 2, "did you mean 'rate_monotonic'?")

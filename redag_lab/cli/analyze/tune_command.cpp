@@ -163,7 +163,7 @@ Action add_tune(CLI::App &app) {
       ->default_str(objective_name(tune.goal.objective));
   app.add_flag("--per-criticality", tune.goal.per_criticality, "Compare settings by their most critical DAGs first");
   app.add_option("--vary", options->vary, "What may change: workers, max_active, order (of DAGs with equal priority)")
-      ->type_name(type_name({"LIST", {"workers", "max_active", "order"}}))
+      ->type_name("LIST")
       ->capture_default_str();
   app.add_option("--caps", options->caps,
                  "Values of max_active to try for every DAG (default: none, and all values that can matter)")

@@ -263,7 +263,7 @@ Action add_compare(CLI::App &app) {
   app.add_option("--executors", options->executors,
                  "Executors to compare: redag, redag-none, redag-cooperative, redag-os, mte, ste, static, events, cbg; "
                  "with -fifo (mte-fifo, ...) on real-time threads")
-      ->type_name(type_name({"LIST", lab::variant_names()}))
+      ->type_name("LIST")
       ->capture_default_str();
   add_count(app, "--repeat", options->repeat, {1, kMostRepetitions},
             "Repetitions, in which the executors take turns; by default 3, or 1 with --simulate, where they take seeds "

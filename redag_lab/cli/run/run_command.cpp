@@ -21,7 +21,7 @@ Action add_run(CLI::App &app) {
   add_workload_arguments(app, *arguments);
   app.add_option("--executor", *executor,
                  "Executor: as for 'redag simulate', and also mte-fifo, ste-fifo, ..., which use real-time threads")
-      ->type_name(type_name({"NAME", lab::variant_names()}))
+      ->type_name("NAME")
       ->capture_default_str();
   add_result_arguments(app, *arguments);
   app.add_flag("--all-tasks", arguments->all_tasks, "Show every task, however many there are");

@@ -3,23 +3,12 @@
 
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "redag_lab/cli/run/single_run.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/options.hpp"
 
 namespace redag::cli {
-namespace {
-
-// Returns the executors that differ in virtual time, which has no threads.
-std::vector<std::string> simulated_names() {
-  std::vector<std::string> names = lab::variant_names();
-  std::erase_if(names, [](const std::string &name) { return name.ends_with("-fifo"); });
-  return names;
-}
-
-}  // namespace
 
 Action add_simulate(CLI::App &app) {
   auto arguments = std::make_shared<RunArguments>();
@@ -27,7 +16,7 @@ Action add_simulate(CLI::App &app) {
   add_workload_arguments(app, *arguments);
   app.add_option("--executor", *executor,
                  "Executor: redag, redag-none, redag-cooperative, redag-os, mte, ste, static, events or cbg")
-      ->type_name(type_name({"NAME", simulated_names()}))
+      ->type_name("NAME")
       ->capture_default_str();
   add_result_arguments(app, *arguments);
   app.add_flag("--all-tasks", arguments->all_tasks, "Show every task, however many there are");

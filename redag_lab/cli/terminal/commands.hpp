@@ -38,7 +38,5 @@ Action add_report(CLI::App &app);
 Action add_top(CLI::App &app);
 Action add_serve(CLI::App &app);
 Action add_why(CLI::App &app);
-Action add_completion(CLI::App &app);
-Action add_man(CLI::App &app);
 
 }  // namespace redag::cli

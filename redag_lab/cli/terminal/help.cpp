@@ -54,34 +54,23 @@ std::string remarks_on(const CLI::Option &option) {
   return remarks.empty() ? std::string() : fmt::format(" ({})", fmt::join(remarks, "; "));
 }
 
-std::string section(const std::string &title, const std::vector<const CLI::Option *> &options, std::size_t width) {
-  std::string text;
-  for (const CLI::Option *option : options) text += row(label_of(*option), description_of(*option), width);
-  return text.empty() ? text : "\n" + title + ":\n" + text;
-}
-
-}  // namespace
-
-std::string type_name(const ValueType &type) {
-  return type.choices.empty() ? type.name : fmt::format("{}{{{}}}", type.name, fmt::join(type.choices, ","));
-}
-
-ValueType value_type(const CLI::Option &option) {
-  const std::string type = option.get_type_name();
-  const std::size_t brace = type.find('{');
-  if (brace == std::string::npos || type.back() != '}') return {type, {}};
-  return {type.substr(0, brace), CLI::detail::split(type.substr(brace + 1, type.size() - brace - 2), ',')};
-}
-
+// Returns all names of an option and its value: "-o, --output FILE".
 std::string label_of(const CLI::Option &option) {
   const std::string name = names_of(option);
-  const std::string type = value_type(option).name;
+  const std::string type = option.get_type_name();
   if (option.get_positional() || type.empty()) return name;
   if (type.rfind("[=", 0) == 0) return name + type;  // a flag that may have a value
   return option.get_type_size() == 0 ? name : name + " " + type;
 }
 
-std::string description_of(const CLI::Option &option) { return option.get_description() + remarks_on(option); }
+std::string section(const std::string &title, const std::vector<const CLI::Option *> &options, std::size_t width) {
+  std::string text;
+  for (const CLI::Option *option : options)
+    text += row(label_of(*option), option->get_description() + remarks_on(*option), width);
+  return text.empty() ? text : "\n" + title + ":\n" + text;
+}
+
+}  // namespace
 
 HelpFormatter::HelpFormatter(std::size_t width) : width_(width == 0 ? kMostWidth : std::min(width, kMostWidth)) {
   label("SUBCOMMAND", "COMMAND");

@@ -50,20 +50,6 @@ TEST(Help, ListsCommands) {
   EXPECT_NE(app.help().find("\nCommands:\n  one                       The first\n"), std::string::npos);
 }
 
-TEST(Help, ChoicesAreInTheTypeNameAndNotShown) {
-  CLI::App app("Does things.", "prog");
-  app.formatter(std::make_shared<HelpFormatter>());
-  std::string mode;
-  CLI::Option *option = app.add_option("--mode", mode, "Mode")->type_name(type_name({"NAME", {"none", "os"}}));
-  EXPECT_EQ(option->get_type_name(), "NAME{none,os}");
-  EXPECT_EQ(value_type(*option).choices, (std::vector<std::string>{"none", "os"}));
-  EXPECT_EQ(label_of(*option), "--mode NAME");
-  EXPECT_EQ(app.help().find('{'), std::string::npos);
-  option->type_name("FILE");
-  EXPECT_EQ(value_type(*option).name, "FILE");
-  EXPECT_TRUE(value_type(*option).choices.empty());
-}
-
 TEST(Help, FitsANarrowTerminal) {
   CLI::App app("Does something that takes more words than a narrow terminal has room for.", "prog");
   app.formatter(std::make_shared<HelpFormatter>(40));

@@ -80,7 +80,7 @@ std::string taken_for_value(const CLI::App &command) {
   constexpr std::array<std::string_view, 5> kFiles = {"FILE", "DIR", "RESULT", "WORKLOAD", "ROBOT"};
   for (const CLI::Option *option : command.get_options()) {
     if (option->get_positional() || option->get_type_size() == 0) continue;
-    if (std::find(kFiles.begin(), kFiles.end(), value_type(*option).name) != kFiles.end()) continue;
+    if (std::find(kFiles.begin(), kFiles.end(), option->get_type_name()) != kFiles.end()) continue;
     for (const std::string &value : option->results()) {
       std::error_code ignored;
       if (!std::filesystem::is_regular_file(value, ignored)) continue;

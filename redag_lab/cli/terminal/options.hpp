@@ -19,7 +19,6 @@
 #include "redag/base/text.hpp"
 #include "redag/base/time.hpp"
 #include "redag/model/workload.hpp"
-#include "redag_lab/cli/terminal/help.hpp"
 
 namespace redag::cli {
 
@@ -97,7 +96,7 @@ CLI::Option *add_choice(CLI::App &app, const std::string &name, Target &target, 
     }
     reject(name, in_quotes(given) + " is not a valid choice", suggestion(given, names));
   };
-  return app.add_option_function<std::string>(name, set, help + ": " + listed)->type_name(type_name({"NAME", names}));
+  return app.add_option_function<std::string>(name, set, help + ": " + listed)->type_name("NAME");
 }
 
 [[nodiscard]] const Choices<PolicyKind> &policy_choices();

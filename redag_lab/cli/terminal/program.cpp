@@ -109,15 +109,6 @@ constexpr std::array kCommands = {
     Entry{"serve", "Show the running executors in a browser, or to Prometheus", add_serve,
           "  redag serve\n"
           "  redag serve --port 0 --interval 500ms\n"},
-    Entry{"completion", "Write what a shell needs to complete commands, options and files", add_completion,
-          "  source <(redag completion bash)\n"
-          "  redag completion zsh --output _redag\n"
-          "  redag completion fish --output redag.fish\n"},
-    Entry{"man", "Show the manual page of a command, or write all of them", add_man,
-          "  redag man simulate | man -l -\n"
-          "  redag man experiment acceptance\n"
-          "  redag man --out man1\n"
-          "  redag man --markdown > commands.md\n"},
 };
 
 std::vector<std::string> command_names() {
