@@ -16,7 +16,7 @@
 namespace redag {
 namespace {
 
-// A simulation of an hour takes minutes. No default length comes near it, and explorations give up long before.
+// A simulation of an hour takes minutes. No default length comes near it.
 constexpr Duration kLongest = 3600 * kSecond;
 
 /// Returns what round periods of this length are multiples of: two digits, and whole milliseconds of longer ones.

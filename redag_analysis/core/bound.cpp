@@ -35,7 +35,6 @@ const char *to_string(Term::Kind kind) {
     case Term::Kind::Wait: return "wait";
     case Term::Kind::Suspended: return "suspended";
     case Term::Kind::Overhead: return "overhead";
-    case Term::Kind::Waiting: return "waiting";
   }
   return "?";
 }

@@ -28,7 +28,6 @@ struct Term {
     Wait,          // waiting for data of predecessors of other rates; for a DAG, also the age of that data
     Suspended,     // waits of the task or its unit without a worker, without the time in queues of devices
     Overhead,      // the platform's overhead for this job; the terms of others include their own
-    Waiting,       // waiting for workers, predecessors and releases together, where it cannot be attributed
   };
   Kind kind = Kind::Own;
   TaskId task;  // the task that causes it; neither `task` nor `dag`: no single cause

@@ -82,7 +82,7 @@ struct CompiledTask {
   std::uint32_t unit = 0;
   Duration wcet = 0;      // C with overheads and waits
   Duration wcet_low = 0;  // C(LO) with overheads, while wcet is C(HI); equal to wcet if the task has no `wcet_low`
-  Duration bcet = 0;      // with overheads, > 0; only the exploration reads it: bounds hold for shorter executions
+  Duration bcet = 0;      // with overheads, > 0; only explorations of tests read it: bounds hold for shorter executions
   Duration overhead = 0;  // the part of `wcet` that is overhead
   Duration waits = 0;     // the part of `wcet` in which the job needs no worker: all of `devices`, and `elsewhere`
   std::vector<DeviceUse> devices;  // by DeviceId; empty if no task waits

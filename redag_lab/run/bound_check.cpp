@@ -15,7 +15,7 @@ BoundCheck check_bounds(const Session &session) {
   const Workload &workload = info.workload;
   const Result<std::vector<AnalysedPart>> analysed =
       analysis::as_executed(workload, info.config, info.overheads).and_then([&](const analysis::ExecutedRun &run) {
-        return analyse_parts(run.workload, run.platform, nullptr, info.executor);
+        return analyse_parts(run.workload, run.platform, info.executor);
       });
   std::vector<Duration> bounds(workload.task_count(), 0);
   check.methods.resize(bounds.size());

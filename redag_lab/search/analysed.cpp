@@ -99,39 +99,27 @@ std::optional<Diagnostics> keep_only(const std::vector<std::string> &only, std::
 }  // namespace
 
 Result<Analysed> analyse(const Workload &workload, const analysis::AnalysisPlatform &platform,
-                         const analysis::ExplorationOptions *explore, const std::string &executor,
-                         const analysis::AnalyzeOptions &limits, const std::vector<std::string> &only) {
+                         const std::string &executor, const analysis::AnalyzeOptions &limits,
+                         const std::vector<std::string> &only) {
   const executors::ExecutorKind *kind = executors::find_executor(executor);
   if (kind == nullptr) return make_error("there is no analysis for the executor '" + executor + "'");
   Result<analysis::TaskSet> task_set = analysis::compile_for(*kind, workload, platform);
   if (!task_set) return tl::unexpected<Diagnostics>(task_set.error());
   std::vector<analysis::Method> methods = analysis::methods_of(*kind);
-  std::shared_ptr<const analysis::Exploration> exploration;
-  if (explore != nullptr && kind->ours) {
-    std::optional<std::string> reason = analysis::why_not_explore(*task_set);
-    if (!reason) exploration = std::make_shared<analysis::Exploration>(analysis::explore(*task_set, *explore));
-    methods.push_back(analysis::exploration());
-    methods.back().apply = [exploration, reason](const analysis::TaskSet &asked) -> analysis::Outcome {
-      if (reason) return analysis::NotApplicable{*reason};
-      return to_bound(asked, *exploration);
-    };
-  }
   if (auto missing = keep_only(only, methods)) return tl::unexpected<Diagnostics>(*std::move(missing));
   analysis::AnalyzeOptions options = limits;
   options.itemise = task_set->tasks.size() <= kMostItemised;
   analysis::Report report = analysis::analyze(*task_set, std::move(methods), options);
-  return Analysed{workload, kind, *std::move(task_set), std::move(report), std::move(exploration)};
+  return Analysed{workload, kind, *std::move(task_set), std::move(report)};
 }
 
 Result<std::vector<AnalysedPart>> analyse_parts(const Workload &workload, const analysis::AnalysisPlatform &platform,
-                                                const analysis::ExplorationOptions *explore,
                                                 const std::string &executor, const analysis::AnalyzeOptions &limits,
                                                 const std::vector<std::string> &only) {
   std::vector<AnalysedPart> all;
   for (ClusterPart &part : parts_of(workload)) {
     if (part.is_cluster() && part.dags.empty()) continue;
-    Result<Analysed> analysed =
-        analyse(part.workload, analysis::platform_of(platform, part), explore, executor, limits, only);
+    Result<Analysed> analysed = analyse(part.workload, analysis::platform_of(platform, part), executor, limits, only);
     if (!analysed) return tl::unexpected<Diagnostics>(std::move(analysed.error()));
     all.push_back(AnalysedPart{std::move(part), *std::move(analysed)});
   }

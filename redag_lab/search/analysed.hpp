@@ -5,7 +5,6 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,7 +13,6 @@
 #include "redag/model/workload.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
 #include "redag_analysis/analyze/executors.hpp"
-#include "redag_analysis/explore/exploration.hpp"
 
 namespace redag::lab {
 
@@ -24,17 +22,14 @@ struct Analysed {
   const executors::ExecutorKind *executor = nullptr;
   analysis::TaskSet task_set;
   analysis::Report report;
-  std::shared_ptr<const analysis::Exploration> exploration;  // null: not requested, or not applicable
 };
 
 /// With at most this many tasks, every bound has its terms. With more, terms_of() computes those of one bound.
 inline constexpr std::size_t kMostItemised = 128;
 
-/// Analyses the workload. With `explore`, exploration() is one of the methods (only for our executor). `limits.itemise`
-/// is ignored. `only` selects methods; empty: all. Error: of analysis::compile(), an executor that executors::all()
-/// does not list, or a method that is not one of the executor's.
+/// Analyses the workload. `limits.itemise` is ignored. `only` selects methods; empty: all. Error: of
+/// analysis::compile(), an executor that executors::all() does not list, or a method that is not one of the executor's.
 [[nodiscard]] Result<Analysed> analyse(const Workload &workload, const analysis::AnalysisPlatform &platform,
-                                       const analysis::ExplorationOptions *explore = nullptr,
                                        const std::string &executor = "redag",
                                        const analysis::AnalyzeOptions &limits = {},
                                        const std::vector<std::string> &only = {});
@@ -48,7 +43,6 @@ struct AnalysedPart {
 /// clusters is one part. `platform` is that of all clusters together.
 [[nodiscard]] Result<std::vector<AnalysedPart>> analyse_parts(const Workload &workload,
                                                               const analysis::AnalysisPlatform &platform,
-                                                              const analysis::ExplorationOptions *explore = nullptr,
                                                               const std::string &executor = "redag",
                                                               const analysis::AnalyzeOptions &limits = {},
                                                               const std::vector<std::string> &only = {});

@@ -109,7 +109,6 @@ def some_command(rng, folder):
         ["compare", file, "--duration", "1s", "--executors", "redag-none,mte", "--repeat", "20", *out],
         ["experiment", "acceptance", SOURCE / "experiments" / "acceptance_dags.yaml", *out],
         ["sensitivity", SOURCE / "workloads" / "robot.yaml", "--simulate"],
-        ["analyze", file, "--preemption", "none", "--explore=100000000"],
     ])
 
 

@@ -254,31 +254,6 @@ dags:
         explained = json.loads(redag("analyze", self.cart, "--json", "--explain", "slow").stdout)
         self.assertEqual(explained["explanation"]["name"], "slow")
 
-    def test_exploration(self):
-        # plan is released with fast, whose two jobs run first. plan ends before the next release of fast.
-        short = self.write("short.yaml", CART.replace("25ms", "7ms"))
-        text = self.expect(redag("analyze", "--explore", short, "--check", "--all"), 0).stdout
-        self.assertRegex(text, r"exploration +schedulable +bounds 3 of 3 tasks; \d+ states, 21 jobs per hyperperiod, exact")
-        self.assertRegex(text, r"slow\.plan +3ns +9ms")
-        document = json.loads(redag("analyze", "--explore", short, "--json").stdout)
-        self.assertEqual(document["exploration"]["end"], "complete")
-        worst = {task["name"]: task["worst_ns"] for task in document["exploration"]["tasks"]}
-        for task in document["tasks"]:
-            self.assertLessEqual(task["bound_ns"], worst[task["name"]])
-        self.assertNotIn("exploration", json.loads(redag("analyze", short, "--json").stdout))
-
-    def test_exploration_ends_early(self):
-        text = self.expect(redag("analyze", "--explore", self.cart, "--all"), 0).stdout
-        self.assertRegex(text, r"exploration +not shown .*; fast\.\w+ can end after its next release")
-        short = self.write("short.yaml", CART.replace("25ms", "7ms"))
-        text = self.expect(redag("analyze", "--explore=21", short, "--all"), 0).stdout
-        self.assertIn("gave up at 21 states", text)
-        self.assertRegex(text, r"dag_one_worker_deferred +schedulable")
-        self.expect(redag("analyze", "--explore=0", short), 2, "'0' is not a number of states from 1 to")
-        self.expect(redag("analyze", "--explore=many", short), 2, "'many' is not a number of states from 1 to")
-        text = self.expect(redag("analyze", "--explore", short, "--preemption", "os", "--all"), 0).stdout
-        self.assertRegex(text, r"methods that do not apply:\n(.*\n)*  requires jobs that run to completion.*\n    .*\bexploration\b")
-
     def test_bad_input(self):
         self.expect(redag("analyze"), 2, "FILE is required")
         self.expect(redag("analyze", self.write("bad.yaml", MISTAKEN)), 2, "did you mean 'wcet'?")

@@ -107,7 +107,6 @@ class Combinations(Case):
             self.refuse(command, self.cart, "--workers", "-1", says="--workers: '-1' is not a whole number from 1 to 4096")
         self.refuse("compare", self.cart, "--repeat", "0", says="--repeat: '0' is not a whole number from 1 to 10000")
         self.refuse("experiment", "acceptance", "--jobs", "100000", says="--jobs: '100000' is not a whole number from 1 to 1024")
-        self.refuse("analyze", "--explore=0", self.cart, says="--explore: '0' is not a number of states from 1 to")
         self.refuse("generate", "--count", "2", "--seed", str(2**64 - 1), "--out", self.folder / "out", says="last seed")
         self.refuse("compare", self.cart, "--simulate", "--repeat", "2", "--seed", str(2**64 - 1), says="last seed")
         self.refuse("tune", self.cart, "--seed", str(2**64 - 1), says="last seed")

@@ -50,7 +50,6 @@ void commands_target(std::string_view input) {
   REDAG_CHECK(answers({"check-trace", results}), "check-trace: what was simulated is lawful");
   REDAG_CHECK(answers({"report", results}), "report");
   REDAG_CHECK(answers({"analyze", file, "--json"}), "analyze");
-  REDAG_CHECK(answers({"analyze", file, "--preemption", "none", "--explore=1000"}), "analyze --explore");
   constexpr std::size_t kMostTasks = 4;  // limit for the commands that analyse repeatedly
   if (loaded->workload.task_count() > kMostTasks) return;
   const bool has_clusters = !loaded->workload.platform.clusters.empty();  // which sensitivity refuses

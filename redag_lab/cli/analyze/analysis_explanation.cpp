@@ -41,7 +41,6 @@ std::string what(const lab::Analysed &analysed, const Term &term) {
     case Term::Kind::Wait: return "waiting for data of other rates";
     case Term::Kind::Suspended: return term.device.valid() ? "service" + at : "waits without a device";
     case Term::Kind::Overhead: return "overhead";
-    case Term::Kind::Waiting: return "all waiting together";
   }
   return "?";
 }
@@ -95,8 +94,6 @@ std::string advice(const lab::Analysed &analysed, const Term &term) {
     case Term::Kind::Wait: return "a shorter period or response time of its predecessors helps most";
     case Term::Kind::Suspended: return "a shorter wait helps most";
     case Term::Kind::Overhead: return "fewer and longer jobs, or smaller scheduling overheads, help most";
-    case Term::Kind::Waiting:
-      return "the exploration found its worst case among all schedules; without --explore, the bounds name the causes";
   }
   return {};
 }

@@ -114,7 +114,6 @@ TEST(Explanation, OfEachKindOfTermSaysWhatItIsAndWhatHelps) {
       {term(Kind::Wait, 6), "waiting for data of other rates", "response time of its predecessors helps most"},
       {term(Kind::Suspended, 6), "waits without a device", "a shorter wait helps most"},
       {term(Kind::Overhead, 6), "overhead", "fewer and longer jobs, or smaller scheduling overheads, help most"},
-      {term(Kind::Waiting, 6), "all waiting together", "without --explore, the bounds name the causes"},
   };
   for (const Case &c : cases) {
     const std::string text = explained(c.largest);

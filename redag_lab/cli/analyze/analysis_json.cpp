@@ -75,39 +75,6 @@ Json method_json(const MethodReport &report) {
   return json;
 }
 
-const char *to_string(analysis::Exploration::End end) {
-  switch (end) {
-    case analysis::Exploration::End::Complete: return "complete";
-    case analysis::Exploration::End::Overrun: return "overrun";
-    case analysis::Exploration::End::GaveUp: return "gave_up";
-    case analysis::Exploration::End::Stopped: return "stopped";
-  }
-  return "?";
-}
-
-Json exploration_json(const lab::Analysed &analysed) {
-  const analysis::Exploration &exploration = *analysed.exploration;
-  Json document = {{"end", to_string(exploration.end)},
-                   {"exact", exploration.exact},
-                   {"states", exploration.states},
-                   {"merged", exploration.merged},
-                   {"jobs", exploration.jobs},
-                   {"hyperperiod_ns", exploration.hyperperiod},
-                   {"hyperperiods", exploration.hyperperiods},
-                   {"tasks", Json::array()}};
-  if (exploration.end != analysis::Exploration::End::Complete) return document;
-  for (std::size_t t = 0; t < exploration.responses.size(); ++t) {
-    Json jobs = Json::array();
-    for (const analysis::ResponseRange &range : exploration.responses[t]) jobs.push_back({range.best, range.worst});
-    const analysis::ResponseRange all = exploration.of(TaskId(t));
-    document["tasks"].push_back(Json{{"name", task_name(analysed, TaskId(t))},
-                                     {"best_ns", all.best},
-                                     {"worst_ns", all.worst},
-                                     {"jobs_ns", std::move(jobs)}});
-  }
-  return document;
-}
-
 }  // namespace
 
 Json to_json(const lab::Analysed &analysed, bool each) {
@@ -153,14 +120,12 @@ Json to_json(const lab::Analysed &analysed, bool each) {
     method["tasks"] = bound != nullptr ? bounds_json(bound->tasks, tasks) : Json::array();
     method["dags"] = bound != nullptr ? bounds_json(bound->dags, dags) : Json::array();
   }
-  if (analysed.exploration != nullptr) document["exploration"] = exploration_json(analysed);
   return document;
 }
 
 Json methods_json() {
   Json all = Json::array();
   for (const Method &method : analysis::methods()) all.push_back(method_json(method));
-  all.push_back(method_json(analysis::exploration()));
   for (const Method &method : analysis::executor_methods()) all.push_back(method_json(method));
   return Json{{"format", "redag.methods/1"}, {"methods", std::move(all)}};
 }

@@ -112,35 +112,6 @@ std::string method_table(const lab::Analysed &analysed, const StreamTraits &term
          (others.empty() ? "" : "methods that do not apply:\n" + others);
 }
 
-// Returns the best and worst responses over all schedules. Bounds give no best case.
-std::string exploration_table(const lab::Analysed &analysed, const StreamTraits &terminal, bool all) {
-  const analysis::Exploration &exploration = *analysed.exploration;
-  Table table({{"explored", false, 9}, {"best", true, 5}, {"worst", true, 5}});
-  const std::size_t shown = all ? analysed.task_set.tasks.size() : std::min(kMostTasks, analysed.task_set.tasks.size());
-  for (std::size_t t = 0; t < shown; ++t) {
-    const analysis::ResponseRange range = exploration.of(TaskId(t));
-    table.add({{task_name(analysed, TaskId(t))}, {humanize_duration(range.best)}, {humanize_duration(range.worst)}});
-  }
-  return table.render(terminal.width, terminal.colour) +
-         fmt::format(
-             "best and worst response to the source's release, over all possible schedules with the stated offsets "
-             "and jitter, execution times from bcet to wcet, and strictly periodic timers{}\n",
-             exploration.exact ? "" : "; with several workers the range can be too wide, but never too narrow");
-}
-
-// Returns what --explore found: a table, or one line that gives the reason for having none. Empty: not requested.
-std::string exploration_text(const lab::Analysed &analysed, const StreamTraits &terminal) {
-  if (analysed.exploration != nullptr && analysed.exploration->end == analysis::Exploration::End::Complete) {
-    return "\n" + exploration_table(analysed, terminal, false);
-  }
-  for (const MethodReport &report : analysed.report.methods) {
-    if (report.method->name != analysis::exploration().name) continue;
-    const auto *reason = std::get_if<NotApplicable>(&report.outcome);
-    return fmt::format("no exploration: {}\n", reason != nullptr ? reason->reason : report.bound()->figures);
-  }
-  return {};
-}
-
 std::string headline(const lab::Analysed &analysed) {
   const analysis::AnalysisPlatform &platform = analysed.task_set.platform;
   const std::string reason = mode_reason(analysed);
@@ -267,9 +238,6 @@ std::string describe(const lab::Analysed &analysed, const StreamTraits &terminal
   const std::size_t colon = words.find(':');
   text += "\n" + tinted(words.substr(0, colon), yes ? Tint::Good : Tint::Bad, terminal.colour) + words.substr(colon);
   text += "\n\n" + describe_gave_up(analysed.report) + method_table(analysed, terminal);
-  if (analysed.exploration != nullptr && analysed.exploration->end == analysis::Exploration::End::Complete) {
-    text += "\n" + exploration_table(analysed, terminal, all);
-  }
   return text;
 }
 
@@ -310,7 +278,7 @@ std::string summarise(const lab::Analysed &analysed, const StreamTraits &termina
   text += fmt::format("preemption: {}{}\n", mode_name(analysed), reason.empty() ? "" : " (" + reason + ")");
   text += fmt::format("--all shows every task and method{}\n",
                       weakest ? "; --explain " + weakest->name + " explains its bound" : "");
-  return text + exploration_text(analysed, terminal);
+  return text;
 }
 
 std::string methods_that_do_not_apply(const analysis::Report &report, bool tests) {
@@ -350,7 +318,6 @@ std::string describe_methods() {
     if (method.is_paper()) text += fmt::format("  sound only if: {}\n", method.sound_only_if);
   };
   for (const Method &method : analysis::methods()) describe(method, method.is_paper() ? ", paper" : "");
-  describe(analysis::exploration(), "; with --explore");
   text +=
       "\n"
       "Methods for rclcpp's own executors, with --executor ste or mte:\n";

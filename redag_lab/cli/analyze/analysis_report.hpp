@@ -36,7 +36,7 @@ namespace redag::cli {
 /// a workload that is not shown schedulable.
 [[nodiscard]] std::optional<std::string> suggested_change(const lab::Analysed &analysed, const lab::Row &weakest);
 /// Returns the verdict, the weakest task or DAG, a suggested change where some deadline is not shown, and a pointer to
-/// further options. With an exploration, adds its table.
+/// further options.
 [[nodiscard]] std::string summarise(const lab::Analysed &analysed, const StreamTraits &terminal);
 
 /// Returns a headline, tables, the verdict, and a line for each method. `all`: a row for every task, regardless of

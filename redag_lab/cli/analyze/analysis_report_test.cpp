@@ -46,7 +46,7 @@ TEST(AnalysisReport, KnownResponsesOnOneWorker) {
 TEST(AnalysisReport, AnotherExecutorIsItsOwnHeadlineAndMethods) {
   Workload workload = two_tasks(PreemptionMode::Os);
   workload.dags[0].tasks[0].period = workload.dags[0].tasks[0].deadline = 20 * kMillisecond;
-  const Result<lab::Analysed> analysed = lab::analyse(workload, analysis::platform_of(workload), nullptr, "ste");
+  const Result<lab::Analysed> analysed = lab::analyse(workload, analysis::platform_of(workload), "ste");
   ASSERT_TRUE(analysed);
   EXPECT_EQ(lab::task_rows(*analysed)[0].tightest.response, 10 * kMillisecond) << "3 after 7";
   const std::string text = describe(*analysed, StreamTraits{}, false);
@@ -55,38 +55,10 @@ TEST(AnalysisReport, AnotherExecutorIsItsOwnHeadlineAndMethods) {
   EXPECT_EQ(text.find("rta_nonpreemptive"), std::string::npos) << text;
   EXPECT_EQ(to_json(*analysed)["executor"], "ste");
   EXPECT_EQ(to_json(*analysed)["preemption"], "none");
-  EXPECT_FALSE(lab::analyse(workload, analysis::platform_of(workload), nullptr, "SingleThreadedExecutor"));
+  EXPECT_FALSE(lab::analyse(workload, analysis::platform_of(workload), "SingleThreadedExecutor"));
 }
 
 // Without preemption and with fixed offsets, b never arrives while a runs, nor a while b runs.
-TEST(AnalysisReport, AnExplorationIsAMethodAmongOthers) {
-  Workload workload = two_tasks(PreemptionMode::None);
-  workload.dags[1].tasks[0].offset = 3 * kMillisecond;
-  const analysis::ExplorationOptions options;
-  const Result<lab::Analysed> analysed = lab::analyse(workload, analysis::platform_of(workload), &options);
-  ASSERT_TRUE(analysed);
-  const std::vector<lab::Row> rows = lab::task_rows(*analysed);
-  EXPECT_EQ(rows[0].tightest.response, 3 * kMillisecond);
-  EXPECT_EQ(rows[0].says->name, "exploration");
-  const std::string text = describe(*analysed, StreamTraits{}, false);
-  EXPECT_NE(text.find("4 states, 3 jobs per hyperperiod, exact"), std::string::npos) << text;
-  const Json document = to_json(*analysed)["exploration"];
-  EXPECT_EQ(document["end"], "complete");
-  EXPECT_EQ(document["tasks"][1]["worst_ns"], 7 * kMillisecond);
-  EXPECT_EQ(document["tasks"][0]["jobs_ns"].size(), 2U);
-
-  EXPECT_FALSE(to_json(look_at(workload)).contains("exploration"));
-  workload.platform.preemption = PreemptionMode::Os;
-  const Result<lab::Analysed> preempted = lab::analyse(workload, analysis::platform_of(workload), &options);
-  ASSERT_TRUE(preempted);
-  EXPECT_EQ(preempted->exploration, nullptr);
-  const std::string summary = summarise(*preempted, StreamTraits{});
-  EXPECT_NE(summary.find("\nno exploration: requires jobs that run to completion"), std::string::npos) << summary;
-  EXPECT_EQ(summarise(look_at(workload), StreamTraits{}).find("exploration"), std::string::npos);
-  EXPECT_EQ(preempted->report.methods.back().method->name, "exploration");
-  EXPECT_EQ(preempted->report.methods.back().bound(), nullptr);
-}
-
 TEST(AnalysisReport, ATightDeadlineIsNamedNotCalledAMiss) {
   Workload workload = two_tasks(PreemptionMode::Os);
   workload.dags[1].tasks[0].deadline = 9 * kMillisecond;

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <memory>
 #include <optional>
 #include <string>
@@ -33,7 +32,6 @@ struct AnalyzeOptions {
   std::vector<std::string> only;  // names of methods
   bool methods = false;
   bool all = false;
-  std::uint64_t explore = 0;  // states; 0: not requested
 };
 
 const Choices<std::string> &executor_choices() {
@@ -45,7 +43,6 @@ const Choices<std::string> &executor_choices() {
   return kAll;
 }
 
-constexpr std::uint64_t kUsualStates = 1'000'000;
 constexpr std::uint64_t kMostEffort = 1'000'000'000;
 
 using Parts = std::vector<lab::AnalysedPart>;
@@ -176,16 +173,6 @@ bool report(const Parts &parts, const AnalyzeOptions &options, Console &console)
   return true;
 }
 
-constexpr std::uint64_t kMostStates = 1'000'000'000;
-
-std::string is_states(const std::string &text) {
-  std::uint64_t count = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), count);
-  const bool is_count = error == std::errc{} && end == text.data() + text.size() && count > 0 && count <= kMostStates;
-  return is_count ? std::string()
-                  : fmt::format("{} is not a number of states from 1 to {}", in_quotes(text), kMostStates);
-}
-
 // Analyses the workload. After Ctrl-C, the answers of the other methods remain.
 Result<Parts> analyse_configured(const Workload &workload, const AnalyzeOptions &options, Console &console) {
   const Result<analysis::AnalysisPlatform> configured = platform_for(workload, options.analysis, options.executor);
@@ -193,30 +180,12 @@ Result<Parts> analyse_configured(const Workload &workload, const AnalyzeOptions 
   const analysis::AnalysisPlatform &platform = *configured;
   const InterruptGuard guard;
   AnalysisWatch watch(options.analysis, console);
-  if (options.explore == 0) {
-    return lab::analyse_parts(workload, platform, nullptr, options.executor, watch.options(), options.only);
-  }
-  Progress &progress = watch.progress();
-  progress.set_label("explore");
-  analysis::ExplorationOptions explore;
-  explore.max_states = options.explore;
-  explore.proceed = [&](const analysis::ExplorationProgress &at) {
-    if (progress.due()) {
-      const double round = static_cast<double>(at.jobs) / static_cast<double>(at.jobs_in_a_round);
-      progress.draw(std::min(1.0, round), fmt::format("{} states", format_count(at.states)));
-    }
-    return watch.why_stop().empty();
-  };
-  Result<Parts> analysed =
-      lab::analyse_parts(workload, platform, &explore, options.executor, watch.options(), options.only);
-  progress.clear();
-  if (InterruptGuard::interrupted()) console.warn("interrupted: the exploration is incomplete");
-  return analysed;
+  return lab::analyse_parts(workload, platform, options.executor, watch.options(), options.only);
 }
 
 int analyze_file(const AnalyzeOptions &options, const CLI::App &command, Console &console) {
   if (options.analysis.run.file.empty()) {
-    const bool wants_file = !options.explain.empty() || !options.chains.empty() || options.explore > 0;
+    const bool wants_file = !options.explain.empty() || !options.chains.empty();
     if (options.methods && !wants_file) {
       if (options.analysis.run.json) {
         console.print(to_text(methods_json()));
@@ -227,11 +196,6 @@ int analyze_file(const AnalyzeOptions &options, const CLI::App &command, Console
     }
     console.error("FILE is required" + taken_for_value(command),
                   "only --methods works without it, alone or with --json");
-    return kExitBad;
-  }
-  if (options.explore > 0 && options.executor != "redag") {
-    console.error("--explore is available for ReDAG-RT only, not for executor '" + options.executor + "'",
-                  "leave out --explore or --executor");
     return kExitBad;
   }
   if (!options.chains.empty() && options.executor != "redag") {
@@ -278,15 +242,6 @@ Action add_analyze(CLI::App &app) {
       ->allow_extra_args(false);
   app.add_flag("--all", options->all,
                "Show all tasks and DAGs, the result of each method, and the methods that do not apply");
-  app.add_flag(
-         "--explore{" + std::to_string(kUsualStates) + "}", options->explore,
-         "Explore all schedules of strictly periodic jobs that run to completion, in at most STATES states (default " +
-             format_count(kUsualStates) + "); gives best and worst responses, exact on one worker")
-      ->type_name("[=STATES]")
-      ->disable_flag_override(false)
-      ->default_str("")  // CLI11 2.4 would otherwise read a "0" where the flag is absent
-      ->force_callback(false)
-      ->check(is_states);
   add_count(app, "--effort", options->analysis.effort, {0, kMostEffort},
             "Steps after which one method gives up, in millions; 0: no limit. The result is the same on every machine")
       ->group("Limits");

@@ -109,7 +109,7 @@ int sensitivity_of_file(const SensitivityOptions &options, Console &console) {
   AnalysisWatch watch(options.analysis, console);
   Result<lab::Analysed> analysed =
       platform_for(*workload, options.analysis).and_then([&](const analysis::AnalysisPlatform &platform) {
-        return lab::analyse(*workload, platform, nullptr, "redag", watch.options());
+        return lab::analyse(*workload, platform, "redag", watch.options());
       });
   if (!analysed) {
     console.note(analysed.error());

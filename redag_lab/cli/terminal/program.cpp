@@ -64,7 +64,6 @@ constexpr std::array kCommands = {
           "  redag analyze workloads/robot.yaml --explain control.controller\n"
           "  redag analyze workloads/robot.yaml --chain lidar.scan,lidar.planner\n"
           "  redag analyze workloads/robot.yaml --executor ste\n"
-          "  redag analyze workloads/robot.yaml --preemption none --explore\n"
           "  redag analyze --methods\n"},
     Entry{"sensitivity", "Find how far execution times and rates can grow, or must shrink", add_sensitivity,
           "  redag sensitivity workloads/robot.yaml\n"

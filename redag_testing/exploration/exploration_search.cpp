@@ -1,20 +1,43 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// explore(): breadth first, with a level for each number of dispatched jobs.
+// explore() searches breadth first, with a level for each number of dispatched jobs.
+//
+// Jobs. It covers all jobs from time 0 on: the initial offsets, then hyperperiod after hyperperiod. States that lie
+// within a followed state of an earlier hyperperiod continue as that one did, and are dropped. The search ends when no
+// state is left. It ends early (Overrun) where a job can end after its unit's next release, because jobs would be
+// skipped there. Without an overrun, neither the overrun rule nor `concurrency` matters, and job k of a task takes the
+// data of job k of its predecessors.
+//
+// States. A node is the number of dispatched jobs of each task. A state of a node is a row of intervals: when the x-th
+// worker is free, when the places of each max_active below m and of each group are free, and when the last job of each
+// task ended that successors wait for. With one worker its own interval is enough: when it is free, every job has
+// ended.
+//
+// Step. The candidates are each task's next job, if all its predecessors' jobs have been dispatched. Let E be the
+// interval in which a candidate becomes eligible, and A_x the interval of the x-th worker. A candidate can be the next
+// to start at t only if: (1) t >= max(A_1, E), earliest ends; (2) t <= max(A_1, least E), latest ends, because no
+// worker idles from then on; (3) t < the latest end of E of every more urgent candidate. A job's turn among equals is
+// the nominal release of its unit, so the order is known in every state. The job ends in [t + bcet, t + wcet]. For (3),
+// the ends that the candidate or a started job also waited for do not count, nor does a job that surely ends before A_2
+// begins. For (2) they count, because it bounds t from the last start.
+//
+// One worker: exact. By induction, every instant at which the worker becomes free is reached, whatever the later
+// releases are: within the worker's interval take its end as t, otherwise let the candidate's release be seen at t.
+// Several workers: safe. Intervals forget that a worker and its job's successor become free at one instant, and merging
+// unites rows. Ranges can be too wide, never too narrow.
 #include <algorithm>
 #include <limits>
 
 #include "redag/base/check.hpp"
-#include "redag_analysis/explore/exploration.hpp"
-#include "redag_analysis/explore/exploration_model.hpp"
-#include "redag_analysis/explore/exploration_states.hpp"
+#include "redag_testing/exploration/exploration.hpp"
+#include "redag_testing/exploration/exploration_model.hpp"
+#include "redag_testing/exploration/exploration_states.hpp"
 
 namespace redag::analysis {
 namespace {
 
 constexpr std::uint32_t kNone = 0xffffffff;
-constexpr std::uint32_t kNodesBetweenCalls = 256;  // of ExplorationOptions::proceed
 constexpr Interval kForgotten{std::numeric_limits<Time>::min(), std::numeric_limits<Time>::min()};
 
 const ExploredTask kAlone;
@@ -26,10 +49,10 @@ bool contains(const std::vector<Value> &values, const Value &value) {
 
 class Explorer {
  public:
-  Explorer(const TaskSet &task_set, const ExplorationOptions &options)
+  Explorer(const TaskSet &task_set, std::uint64_t max_states)
       : task_set_(task_set),
-        options_(options),
-        model_(exploration_model(task_set, options.max_states)),
+        max_states_(max_states),
+        model_(exploration_model(task_set, max_states)),
         workers_(model_.workers),
         tasks_(model_.tasks) {
     result_.hyperperiod = model_.hyperperiod;
@@ -39,7 +62,7 @@ class Explorer {
   }
 
   Exploration run() {
-    if (result_.jobs > options_.max_states) return std::move(result_);
+    if (result_.jobs > max_states_) return std::move(result_);
     StateSet now(tasks_.size(), model_.width, workers_);
     StateSet next = now;
     StateSet seen = now;  // at the ends of hyperperiods
@@ -49,7 +72,7 @@ class Explorer {
       next.clear();
       next_earliest_.clear();
       for (std::uint32_t node = 0; node < now.size(); ++node) {
-        if ((node % kNodesBetweenCalls == 0 && !proceed(level)) || !follow(now, node, next)) return std::move(result_);
+        if (!follow(now, node, next)) return std::move(result_);
       }
       if (level % result_.jobs == 0) {
         ++result_.hyperperiods;
@@ -73,12 +96,6 @@ class Explorer {
     std::int64_t urgency = 0;  // tier, or absolute deadline (edf); equals take turns
     std::uint32_t rank = 0;
   };
-
-  bool proceed(std::uint64_t level) {
-    if (!options_.proceed || options_.proceed({result_.states, level - 1, result_.jobs})) return true;
-    result_.end = Exploration::End::Stopped;
-    return false;
-  }
 
   void start(StateSet &states) {
     counts_.assign(tasks_.size(), 0);
@@ -276,7 +293,7 @@ class Explorer {
       ++result_.merged;
       return true;
     }
-    if (result_.states == options_.max_states) return false;
+    if (result_.states == max_states_) return false;
     ++result_.states;
     return true;
   }
@@ -351,7 +368,7 @@ class Explorer {
   }
 
   const TaskSet &task_set_;
-  const ExplorationOptions &options_;
+  std::uint64_t max_states_;
   const ExplorationModel model_;
   const std::uint32_t workers_;
   const std::vector<ExploredTask> &tasks_;
@@ -370,9 +387,9 @@ class Explorer {
 
 }  // namespace
 
-Exploration explore(const TaskSet &task_set, const ExplorationOptions &options) {
+Exploration explore(const TaskSet &task_set, std::uint64_t max_states) {
   REDAG_CHECK(!why_not_explore(task_set), "nothing to explore");
-  return Explorer(task_set, options).run();
+  return Explorer(task_set, max_states).run();
 }
 
 }  // namespace redag::analysis

@@ -3,7 +3,7 @@
 
 // Compares the exploration with the scheduler that runs for real: on tiny task sets with every release jitter and
 // execution time, on larger ones with random ones. Also compares it with the bounds, which hold for more than it does.
-#include "redag_analysis/explore/exploration.hpp"
+#include "redag_testing/exploration/exploration.hpp"
 
 #include <gtest/gtest.h>
 
@@ -299,9 +299,7 @@ TEST(ExplorationProperty, NoSimulatedResponseIsOutside) {
     limits.rich = true;
     const BoundCase bound_case = random_case(rng, limits);
     const TaskSet task_set = compiled(bound_case);
-    ExplorationOptions options;
-    options.max_states = 20'000;
-    const Exploration exploration = explore(task_set, options);
+    const Exploration exploration = explore(task_set, 20'000);
     if (exploration.end != Exploration::End::Complete) continue;
     ++complete;
     Seen seen = nothing_seen(exploration);

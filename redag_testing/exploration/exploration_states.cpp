@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_analysis/explore/exploration_states.hpp"
+#include "redag_testing/exploration/exploration_states.hpp"
 
 #include <algorithm>
 

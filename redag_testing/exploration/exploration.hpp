@@ -2,34 +2,20 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Explores all schedules of a strictly periodic task set whose jobs run to completion. Gives the least and the largest
-// response of every job, over all release jitters in [0, J] and execution times in [bcet, wcet]. Unlike the other
-// methods it relies on the stated offsets. What is explored and why that suffices: docs/analysis.md, "Exploration". M.
-// Nasri, B. Brandenburg, An exact and sustainable analysis of non-preemptive scheduling, RTSS 2017; M. Nasri, G.
-// Nelissen, B. Brandenburg, Response-time analysis of limited-preemptive parallel DAG tasks under global scheduling,
-// ECRTS 2019.
+// response of every job, over all release jitters in [0, J] and execution times in [bcet, wcet]. Unlike the
+// bounds it relies on the stated offsets. Why that suffices: exploration_search.cpp. M. Nasri, B. Brandenburg, An exact
+// and sustainable analysis of non-preemptive scheduling, RTSS 2017; M. Nasri, G. Nelissen, B. Brandenburg,
+// Response-time analysis of limited-preemptive parallel DAG tasks under global scheduling, ECRTS 2019.
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "redag_analysis/core/bound.hpp"
+#include "redag_analysis/core/task_set.hpp"
 
 namespace redag::analysis {
-
-struct ExplorationProgress {
-  std::uint64_t states = 0;
-  std::uint64_t jobs = 0;             // dispatched on every path up to now
-  std::uint64_t jobs_in_a_round = 0;  // of one hyperperiod; more than one or two rounds are rarely needed
-};
-
-struct ExplorationOptions {
-  std::uint64_t max_states = 1'000'000;
-  /// Called regularly; false stops the exploration. If empty, nothing stops it.
-  std::function<bool(const ExplorationProgress &)> proceed;
-};
 
 /// The responses of one job, from the nominal release of its unit to its finish.
 struct ResponseRange {
@@ -44,7 +30,6 @@ struct Exploration {
     Complete,  // every schedule was followed until it repeats
     Overrun,   // a job of `late` can end after its unit's next release (on several workers: possibly)
     GaveUp,    // at max_states, or at once if a hyperperiod has more jobs than that
-    Stopped,   // by `proceed`
   };
   End end = End::GaveUp;
   bool exact = false;              // each range is tight: one worker
@@ -69,12 +54,6 @@ struct Exploration {
 /// Explores the task set. Requires !why_not_explore(task_set). Follows at most max_states states in a time of O(n)
 /// each; with edges or gates O(n^2) at worst. On one worker the number of states is pseudo-polynomial only if few jobs
 /// are pending at a time.
-[[nodiscard]] Exploration explore(const TaskSet &task_set, const ExplorationOptions &options = {});
-
-/// Turns an exploration into a bound: the largest responses if it is complete.
-[[nodiscard]] Bound to_bound(const TaskSet &task_set, const Exploration &exploration);
-
-/// explore() as a method. It is not in methods(), because it can take long.
-[[nodiscard]] Method exploration(ExplorationOptions options = {});
+[[nodiscard]] Exploration explore(const TaskSet &task_set, std::uint64_t max_states = 1'000'000);
 
 }  // namespace redag::analysis
