@@ -28,7 +28,7 @@ set(alone
   redag_analysis/sim/waits_test.cpp
   redag_lab/cli/analyze/analysis_report.cpp
   redag_lab/cli/analyze/analysis_report_test.cpp
-  redag_lab/cli/analyze/difference_report.cpp
+  redag_lab/cli/run/difference_report.cpp
   redag_lab/cli/analyze/tuning_report.cpp
   redag_lab/cli/run/why_report.cpp
   redag_lab/experiment/factorial_plan_test.cpp

@@ -47,7 +47,7 @@ class EveryOption(Case):
     def arguments(self, command):
         if command in (["generate"], ["calibrate"], ["top"], ["experiment"], ["experiment", "acceptance"]):
             return []
-        return [self.cart, self.cart] if command == ["diff"] else [self.cart]
+        return [self.cart]
 
     def refuse(self, command, option, value):
         result = redag(*command, *self.arguments(command), f"{option}={value}")
@@ -171,7 +171,7 @@ class Files(Case):
         for place in ("/dev/zero", "/nonexistent", self.folder / "empty"):
             (self.folder / "empty").mkdir(exist_ok=True)
             for command in (["validate"], ["simulate"], ["analyze"], ["check-trace"], ["report"], ["experiment", "factorial"],
-                            ["experiment", "acceptance"], ["diff", self.cart], ["experiment", "merge", "--out", self.folder / "m"]):
+                            ["experiment", "acceptance"], ["experiment", "merge", "--out", self.folder / "m"]):
                 result = self.expect(self.limited(*command, place), 2, "error: ")
                 self.assertLess(len(result.stderr), 4000)
         self.assertFalse((self.folder / "m").exists())

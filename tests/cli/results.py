@@ -2,7 +2,7 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Tests the commands that read results: `redag diff`, `check-trace`, `events`, `report`, `tune`.
+"""Tests the commands that read results: `redag compare A B`, `check-trace`, `events`, `report`, `tune`.
 
 Usage: results.py PROGRAM SOURCE_DIR. Uses the standard library only.
 """
@@ -18,7 +18,7 @@ from pftrace import Picture
 from program import CART, MISTAKEN, PROGRAM, SOURCE, Case, body, interrupt, main, redag
 
 
-class Diff(Case):
+class CompareResults(Case):
     def results(self, name, *arguments, file=None):
         folder = self.folder / name
         self.expect(redag("simulate", file or self.cart, "--duration", "20s", "--out", folder, *arguments), 0)
@@ -27,59 +27,59 @@ class Diff(Case):
     def test_better_and_worse(self):
         none = self.results("none")
         full = self.results("full", "--preemption", "os")
-        result = self.expect(redag("diff", none, full), 0)
+        result = self.expect(redag("compare", none, full), 0)
         self.assertRegex(result.stdout, r"\AB misses fewer deadlines than A: 0 instead of 200 \([\d.]+ %\) of all jobs; "
                                         r"\d+ figures are better, \d+ figures? (is|are) worse\n")
         self.assertIn("differs preemption: none -> os", result.stdout)
         self.assertLess(result.stdout.index("\nbetter "), result.stdout.index("\nworse "), "as the conclusion says")
         self.assertNotIn("caution", result.stdout)
-        self.assertRegex(redag("diff", full, none).stdout, r"\AB misses more deadlines than A: 200 ")
+        self.assertRegex(redag("compare", full, none).stdout, r"\AB misses more deadlines than A: 200 ")
         self.assertIn("better fast.sense: missed 200 (10.0 %) -> 0", result.stdout)
         self.assertIn("worse slow.plan: p50 27ms -> 33ms", result.stdout)
         self.assertNotIn("correlated beyond the blocks", result.stdout)
-        self.expect(redag("diff", none, full, "--check"), 1)
-        self.expect(redag("diff", none, none, "--check"), 0)
-        equal = redag("diff", none, none)
+        self.expect(redag("compare", none, full, "--check"), 1)
+        self.expect(redag("compare", none, none, "--check"), 0)
+        equal = redag("compare", none, none)
         self.assertRegex(equal.stdout, r"\AA and B miss equally many deadlines: .*; no figure differs significantly\n")
         self.assertNotIn("plan", equal.stdout)
         self.assertIn("(5 rows without a difference; --all-tasks shows all)", equal.stdout)
-        self.assertIn("plan", redag("diff", none, none, "--all-tasks").stdout)
-        document = self.document(redag("diff", none, full, "--json"), "redag.difference/2")
+        self.assertIn("plan", redag("compare", none, none, "--all-tasks").stdout)
+        document = self.document(redag("compare", none, full, "--json"), "redag.difference/2")
         self.assertEqual(document["changes"], [{"kind": "setting", "what": "preemption", "a": "none", "b": "os"}])
         self.assertEqual([row["task"] for row in document["rows"]], [None, None, "sense", "act", None, "plan"])
         self.assertTrue(document["worse"] and document["better"])
-        self.assertEqual(body(redag("diff", none, full, "--json").stdout), body(redag("diff", none, full, "--json").stdout))
+        self.assertEqual(body(redag("compare", none, full, "--json").stdout), body(redag("compare", none, full, "--json").stdout))
 
     def test_repetitions(self):
         file = self.write("random.yaml", CART.replace("wcet: 1ms, period", "wcet: 1ms, bcet: 1us, period"))
         folder = self.folder / "cmp"
         self.expect(redag("compare", file, "--simulate", "--duration", "20s", "--repeat", "3", "--executors",
                           "redag,mte", "--out", folder), 0)
-        result = redag("diff", folder / "mte", folder / "redag", "--json")
+        result = redag("compare", folder / "mte", folder / "redag", "--json")
         self.assertEqual(self.document(result, "redag.difference/2")["a"]["seeds"], [1, 2, 3])
-        self.expect(redag("diff", folder, folder / "mte"), 2, "holds runs of several kinds: redag, mte", "name one of them")
+        self.expect(redag("compare", folder, folder / "mte"), 2, "holds runs of several kinds: redag, mte", "name one of them")
         # Repetitions in folders of other names, as run_workload of redag_rclcpp_lab writes them.
         for n in 1, 2, 3:
             (folder / "redag" / f"repetition-{n}").rename(folder / "redag" / str(n))
-        again = self.document(redag("diff", folder / "mte", folder / "redag", "--json"), "redag.difference/2")
+        again = self.document(redag("compare", folder / "mte", folder / "redag", "--json"), "redag.difference/2")
         self.assertEqual(again["b"]["seeds"], [1, 2, 3])
         self.assertEqual(again["rows"], json.loads(result.stdout)["rows"])
 
     def test_other_workload(self):
         one = self.results("one")
         other = self.results("other", file=self.write("other.yaml", CART.replace("25ms", "20ms")))
-        self.expect(redag("diff", one, other), 2, "different workloads: wcet of slow.plan: 25ms -> 20ms", "--different")
-        result = self.expect(redag("diff", one, other, "--different"), 0)
+        self.expect(redag("compare", one, other), 2, "different workloads: wcet of slow.plan: 25ms -> 20ms", "--different")
+        result = self.expect(redag("compare", one, other, "--different"), 0)
         self.assertIn("caution: the two sides ran different workloads", result.stdout)
 
     def test_what_else_differs(self):
         simulated = self.results("simulated")
         slowed = self.results("slowed", "--overhead-dispatch", "100us")
         self.assertIn("caution: the sides were charged different overheads: none, and release 0s, dispatch 100us, preempt 0s",
-                      self.expect(redag("diff", simulated, slowed), 0).stdout)
+                      self.expect(redag("compare", simulated, slowed), 0).stdout)
         on_threads = self.folder / "threads"
         self.expect(redag("run", self.cart, "--duration", "500ms", "--events", "jsonl", "--out", on_threads), 0)
-        text = self.expect(redag("diff", simulated, on_threads), 0).stdout
+        text = self.expect(redag("compare", simulated, on_threads), 0).stdout
         self.assertIn("caution: one side comes from 'simulator', the other from 'threads'", text)
         self.assertIn("caution: one side has a single run", text)
         info, *events = (on_threads / "events.jsonl").read_text().splitlines(keepends=True)
@@ -88,16 +88,17 @@ class Diff(Case):
         changed["run"]["machine"]["kernel"] += "-other"
         (self.folder / "elsewhere" / "events.jsonl").write_text("".join([json.dumps(changed) + "\n", *events]))
         self.assertIn("caution: the sides ran on different machines or kernels",
-                      self.expect(redag("diff", on_threads, self.folder / "elsewhere"), 0).stdout)
+                      self.expect(redag("compare", on_threads, self.folder / "elsewhere"), 0).stdout)
 
     def test_bad_input(self):
         one = self.results("one")
-        self.expect(redag("diff", one), 2, "B is required")
-        self.expect(redag("diff", one, self.folder / "nowhere"), 2, "nowhere")
+        self.expect(redag("compare", one), 2, "is a folder: name the result to compare it with")
+        self.expect(redag("compare", one, one, "--repeat", "2"), 2, "--repeat is for runs")
+        self.expect(redag("compare", self.cart, "--different"), 2, "--different")
+        self.expect(redag("compare", one, self.folder / "nowhere"), 2, "nowhere")
         (self.folder / "empty").mkdir()
-        self.expect(redag("diff", one, self.folder / "empty"), 2, "no events.redag")
-        self.expect(redag("diff", one, one, "--tolerance", "2"), 2, "--tolerance: '2' is not a number from 0 to 0.99")
-        self.expect(redag("diff", one, one, "--replicates", "1"), 2, "--replicates")
+        self.expect(redag("compare", one, self.folder / "empty"), 2, "no events.redag")
+        self.expect(redag("compare", one, one, "--tolerance", "2"), 2, "--tolerance: '2' is not a number from 0 to 0.99")
 
 
 class CheckTrace(Case):
@@ -223,7 +224,7 @@ class Events(Case):
         groups = [self.document(redag("report", out, "--json"), "redag.report/2")["groups"][0] for out in (text, blocks)]
         for key in "verdict", "total", "dags", "tasks", "timeline", "schedule", "why":
             self.assertEqual(groups[0][key], groups[1][key], key)
-        self.expect(redag("diff", text, blocks, "--check"), 0)
+        self.expect(redag("compare", text, blocks, "--check"), 0)
 
     def test_the_documented_layout_is_that_of_the_file(self):
         file = self.write("all.yaml", "name: all\nplatform: {workers: 2, preemption: os}\ndags:\n"
@@ -432,7 +433,7 @@ dags:
         after = self.folder / "after"
         for name, folder in (file, before), (tuned, after):
             self.expect(redag("simulate", name, "--duration", "20s", "--seed", "77", "--out", folder), 0)
-        differs = self.expect(redag("diff", before, after), 0).stdout
+        differs = self.expect(redag("compare", before, after), 0).stdout
         self.assertIn("differs max_active of wide: none -> 1", differs)
         self.assertIn("better quick: missed", differs)
 

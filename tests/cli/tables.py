@@ -89,10 +89,10 @@ class Tables(Case):
     def test_compare(self):
         self.agree("compare", "compare", self.long, "--simulate", "--duration", "1s", "--repeat", "2", "--executors", "redag,mte,ste")
 
-    def test_diff(self):
+    def test_compare_results(self):
         for executor in "redag", "ste":
             self.expect(redag("simulate", self.long, "--duration", "1s", "--executor", executor, "--out", self.folder / executor), 0)
-        self.agree("diff", "diff", "redag", "ste")
+        self.agree("compare_results", "compare", "redag", "ste")
 
     def test_why(self):
         self.expect(redag("simulate", CONTENTION, "--duration", "2s", "--executor", "ste", "--out", self.folder / "run"), 0)

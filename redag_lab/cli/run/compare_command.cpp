@@ -4,10 +4,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <memory>
+#include <set>
+#include <string>
+#include <system_error>
 
+#include "redag/base/text.hpp"
 #include "redag/model/waits.hpp"
 #include "redag/trace/events_file.hpp"
+#include "redag_lab/cli/run/compare_recorded.hpp"
 #include "redag_lab/cli/run/comparison_report.hpp"
 #include "redag_lab/cli/run/run_arguments.hpp"
 #include "redag_lab/cli/run/run_report.hpp"
@@ -22,12 +28,14 @@ namespace {
 constexpr Duration kThreadsDuration = 5 * kSecond;
 constexpr std::uint32_t kThreadsRepetitions = 3;
 constexpr std::uint32_t kMostRepetitions = 10'000;
+constexpr double kMostTolerance = 0.99;  // at 1, all values would be equal
 
 struct CompareOptions {
   RunArguments run;
   std::string executors = "redag,mte,ste";
   std::uint32_t repeat = 0;  // 0: not given
   bool simulate = false;
+  CompareRecordedOptions recorded;  // with `b`, two recorded results are compared, and nothing runs
 };
 
 // Returns false after naming the executors that keep a worker while a callback waits, if some callback does.
@@ -217,7 +225,34 @@ class Comparing {
   bool has_picture_ = false;
 };
 
-int compare(const CompareOptions &options, Console &console) {
+// Returns the first option given that only runs take; empty: none.
+std::string option_of_runs(const CLI::App &app) {
+  const std::set<std::string> fits = {"FILE", "B", "--tolerance", "--different", "--all-tasks", "--json", "--check"};
+  for (const CLI::Option *option : app.get_options()) {
+    if (option->count() > 0 && !fits.contains(option->get_name())) return option->get_name();
+  }
+  return {};
+}
+
+// Compares two results of earlier runs.
+int compare_results(const CompareOptions &options, const CLI::App &app, Console &console) {
+  if (const std::string name = option_of_runs(app); !name.empty()) {
+    console.error(name + " is for runs: A and B are compared as they were recorded", "leave it out, or B");
+    return kExitBad;
+  }
+  CompareRecordedOptions recorded = options.recorded;
+  recorded.a = options.run.file;
+  recorded.check = options.run.check;
+  recorded.json = options.run.json;
+  return compare_recorded(recorded, console);
+}
+
+int compare(const CompareOptions &options, const CLI::App &app, Console &console) {
+  if (!options.recorded.b.empty()) return compare_results(options, app, console);
+  if (std::error_code error; std::filesystem::is_directory(options.run.file, error)) {
+    console.error(in_quotes(options.run.file) + " is a folder: name the result to compare it with, or a workload file");
+    return kExitBad;
+  }
   const Result<std::vector<lab::Variant>> variants = lab::parse_variants(options.executors);
   if (!variants) {
     console.note(variants.error());
@@ -259,7 +294,13 @@ int compare(const CompareOptions &options, Console &console) {
 
 Action add_compare(CLI::App &app) {
   auto options = std::make_shared<CompareOptions>();
-  add_workload_arguments(app, options->run);
+  add_workload_arguments(app, options->run,
+                         "Workload to run (YAML; - reads standard input), or a folder of results: A");
+  CLI::Option *other =
+      app.add_option("B", options->recorded.b,
+                     "Folder of results to compare with those of A, as written by run, simulate, compare, or by "
+                     "run_workload of ROS 2; nothing is run then")
+          ->type_name("RESULT");
   app.add_option("--executors", options->executors,
                  "Executors to compare: redag, redag-none, redag-cooperative, redag-os, mte, ste, static, events, cbg; "
                  "with -fifo (mte-fifo, ...) on real-time threads")
@@ -279,7 +320,22 @@ Action add_compare(CLI::App &app) {
   for (const char *name : {"--affinity", "--mlockall", "--realtime", "--spin", "--watchdog"}) {
     option_named(app, name).excludes(simulate);
   }
-  return [options](Console &console) { return compare(*options, console); };
+  const std::string group = "Recorded results";
+  add_number(app, "--tolerance", options->recorded.bootstrap.tolerance, {0, kMostTolerance},
+             "Share by which response percentiles may differ and still count as equal")
+      ->needs(other)
+      ->group(group);
+  app.add_flag("--different", options->recorded.different,
+               "Compare results of different workloads, for the tasks that both have")
+      ->needs(other)
+      ->group(group);
+  app.add_flag("--all-tasks", options->recorded.all_tasks, "Show every task, however many there are")
+      ->needs(other)
+      ->group(group);
+  option_named(app, "--check")
+      .description(
+          "Exit with status 1 if the first executor missed a deadline, or any figure of B is significantly worse");
+  return [options, &app](Console &console) { return compare(*options, app, console); };
 }
 
 }  // namespace redag::cli

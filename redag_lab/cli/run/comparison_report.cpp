@@ -147,17 +147,18 @@ std::string caveat(const lab::Comparison &comparison) {
 std::string describe(const lab::Comparison &comparison, const StreamTraits &terminal) {
   const std::size_t repetitions = comparison.executors.front().repetitions.size();
   const bool simulated = comparison.driver == trace::Driver::Simulator;
-  std::string text = fmt::format("{}: {} worker{}, {} repetition{} of {} {}, seed {}\n", comparison.workload,
-                                 comparison.workers, comparison.workers == 1 ? "" : "s", repetitions,
-                                 repetitions == 1 ? "" : "s", humanize_duration(comparison.duration),
-                                 simulated ? "in virtual time" : "on threads", comparison.seed);
+  std::string text;
+  for (const std::string &line : verdicts(comparison)) text += line + "\n";
+  text += fmt::format("\n{}: {} worker{}, {} repetition{} of {} {}, seed {}\n", comparison.workload, comparison.workers,
+                      comparison.workers == 1 ? "" : "s", repetitions, repetitions == 1 ? "" : "s",
+                      humanize_duration(comparison.duration), simulated ? "in virtual time" : "on threads",
+                      comparison.seed);
   for (const lab::ExecutorResults &results : comparison.executors) {
     text += fmt::format("  {}: preemption {}{}\n", results.variant.name, results.preemption,
                         results.preemption_why.empty() ? "" : " (" + results.preemption_why + ")");
   }
   text += "\n" + comparison_table(comparison, terminal);
   text += legend(comparison, repetitions);
-  for (const std::string &line : verdicts(comparison)) text += line + "\n";
   if (const std::string unfair = caveat(comparison); !unfair.empty()) text += "note: " + unfair + "\n";
   std::string violated;
   for (const lab::ExecutorResults &results : comparison.executors) {

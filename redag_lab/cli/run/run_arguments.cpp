@@ -65,8 +65,8 @@ void add_overhead_arguments(CLI::App &app, RunArguments &arguments, const std::s
   add("--overhead-preempt", arguments.overheads.preempt, "Processor time to resume a preempted job");
 }
 
-void add_workload_arguments(CLI::App &app, RunArguments &arguments) {
-  app.add_option("FILE", arguments.file, "Workload file (YAML); - reads standard input")
+void add_workload_arguments(CLI::App &app, RunArguments &arguments, const char *file_help) {
+  app.add_option("FILE", arguments.file, file_help)
       ->type_name("WORKLOAD")
       ->required();
   add_duration(app, "--duration", arguments.duration, "Length of the run: the time in which jobs are released");

@@ -58,7 +58,8 @@ void add_platform_arguments(CLI::App &app, RunArguments &arguments);
 CLI::Option *add_calibration_argument(CLI::App &app, RunArguments &arguments, const std::string &group);
 /// Adds --overheads FILE and one option for each overhead.
 void add_overhead_arguments(CLI::App &app, RunArguments &arguments, const std::string &group);
-void add_workload_arguments(CLI::App &app, RunArguments &arguments);
+void add_workload_arguments(CLI::App &app, RunArguments &arguments,
+                            const char *file_help = "Workload file (YAML); - reads standard input");
 void add_result_arguments(CLI::App &app, RunArguments &arguments);
 void add_simulator_arguments(CLI::App &app, RunArguments &arguments);
 void add_thread_arguments(CLI::App &app, RunArguments &arguments);

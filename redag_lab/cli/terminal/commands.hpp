@@ -25,7 +25,6 @@ Action add_simulate(CLI::App &app);
 Action add_run(CLI::App &app);
 Action add_calibrate(CLI::App &app);
 Action add_compare(CLI::App &app);
-Action add_diff(CLI::App &app);
 Action add_analyze(CLI::App &app);
 Action add_sensitivity(CLI::App &app);
 Action add_assign(CLI::App &app);

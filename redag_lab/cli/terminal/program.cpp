@@ -50,14 +50,12 @@ constexpr std::array kCommands = {
           "  redag calibrate\n"
           "  sudo redag calibrate --duration 5min --loaded --out overheads.yaml\n"
           "  redag calibrate --duration 5s --json | jq .overheads\n"},
-    Entry{"compare", "Run several executors on the same jobs and compare their results", add_compare,
+    Entry{"compare", "Compare several executors on the same jobs, or two recorded results", add_compare,
           "  redag compare workloads/robot.yaml\n"
           "  redag compare workloads/robot.yaml --executors redag,mte --out results/cmp\n"
-          "  redag compare workloads/robot.yaml --simulate --duration 60s --json\n"},
-    Entry{"diff", "Compare two recorded results and report significant differences", add_diff,
-          "  redag diff results/before results/after\n"
-          "  redag diff results/cmp/mte results/cmp/redag --tolerance 0.1\n"
-          "  redag diff results/main results/branch --check || echo 'worse'\n"},
+          "  redag compare workloads/robot.yaml --simulate --duration 60s --json\n"
+          "  redag compare results/before results/after\n"
+          "  redag compare results/main results/branch --check || echo 'worse'\n"},
     Entry{"analyze", "Bound every response time and show which deadlines are guaranteed", add_analyze,
           "  redag analyze workloads/robot.yaml\n"
           "  redag analyze workloads/robot.yaml --preemption none --workers 2 --check\n"

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_lab/cli/analyze/difference_report.hpp"
+#include "redag_lab/cli/run/difference_report.hpp"
 
 #include <fmt/format.h>
 
@@ -331,7 +331,6 @@ Json to_json(const Diffed &diffed) {
               {"worse", diffed.difference.is_any(Verdict::Worse)},
               {"better", diffed.difference.is_any(Verdict::Better)},
               {"tolerance", diffed.options.tolerance},
-              {"replicates", diffed.options.replicates},
               {"tests", diffed.difference.tests},
               {"p_threshold", diffed.difference.threshold},
               {"rows", rows},

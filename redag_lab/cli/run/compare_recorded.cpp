@@ -1,37 +1,24 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
+#include "redag_lab/cli/run/compare_recorded.hpp"
+
 #include <fmt/format.h>
 
-#include <memory>
-#include <optional>
+#include <algorithm>
 
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/worker_count.hpp"
-#include "redag_lab/cli/analyze/difference_report.hpp"
+#include "redag_lab/cli/run/difference_report.hpp"
 #include "redag_lab/cli/run/recorded_runs.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
-#include "redag_lab/cli/terminal/options.hpp"
 #include "redag_lab/cli/terminal/progress.hpp"
 #include "redag_lab/cli/terminal/signals.hpp"
 
 namespace redag::cli {
 namespace {
 
-constexpr std::uint32_t kFewestReplicates = 100;
-constexpr std::uint32_t kMostReplicates = 1'000'000;
-constexpr double kMostTolerance = 0.99;  // at 1, all values would be equal
 constexpr std::size_t kMostShown = 10;
-
-struct DiffOptions {
-  std::string a;
-  std::string b;
-  lab::BootstrapOptions bootstrap;
-  bool different = false;
-  bool check = false;
-  bool json = false;
-  bool all_tasks = false;
-};
 
 // Returns "a, b, c and 7 more".
 std::string some_of(const std::vector<std::string> &items) {
@@ -40,9 +27,10 @@ std::string some_of(const std::vector<std::string> &items) {
   return items.size() > kMostShown ? fmt::format("{} and {} more", text, items.size() - kMostShown) : text;
 }
 
-class Diffing {
+class RecordedComparison {
  public:
-  Diffing(const DiffOptions &options, Console &console) : options_(options), console_(console), progress_(console) {}
+  RecordedComparison(const CompareRecordedOptions &options, Console &console)
+      : options_(options), console_(console), progress_(console) {}
 
   int run() {
     const InterruptGuard guard;
@@ -142,7 +130,7 @@ class Diffing {
     return true;
   }
 
-  const DiffOptions &options_;
+  const CompareRecordedOptions &options_;
   Console &console_;
   Progress progress_;
   Diffed diffed_;
@@ -150,24 +138,8 @@ class Diffing {
 
 }  // namespace
 
-Action add_diff(CLI::App &app) {
-  auto options = std::make_shared<DiffOptions>();
-  app.add_option(
-         "A", options->a,
-         "Folder of a run or of its repetitions, as written by run, simulate, compare, or by run_workload of ROS 2")
-      ->type_name("RESULT")
-      ->required();
-  app.add_option("B", options->b, "Folder to compare it with")->type_name("RESULT")->required();
-  add_number(app, "--tolerance", options->bootstrap.tolerance, {0, kMostTolerance},
-             "Share by which response percentiles may differ and still count as equal");
-  app.add_flag("--different", options->different, "Compare runs of different workloads, for the tasks that both have");
-  add_count(app, "--replicates", options->bootstrap.replicates, {kFewestReplicates, kMostReplicates},
-            "Number of bootstrap replicates");
-  add_seed(app, options->bootstrap.seed, "Seed of the bootstrap; the same seed gives the same result");
-  app.add_flag("--all-tasks", options->all_tasks, "Show every task, however many there are");
-  app.add_flag("--json", options->json, "Write one JSON document, and nothing else, to standard output");
-  app.add_flag("--check", options->check, "Exit with status 1 if any figure of B is significantly worse");
-  return [options](Console &console) { return Diffing(*options, console).run(); };
+int compare_recorded(const CompareRecordedOptions &options, Console &console) {
+  return RecordedComparison(options, console).run();
 }
 
 }  // namespace redag::cli

@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Presents the result of `diff`: a table, the significant differences in words, and cautions. Pure functions.
+// Presents a comparison of two recorded results: a table, the significant differences in words, and cautions. Pure
+// functions.
 #pragma once
 
 #include <string>
