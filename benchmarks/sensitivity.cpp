@@ -2,12 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Measures the speed of searches over the bounds, in task sets of 20 independent tasks per second: the critical scaling
-// factor of all wcets, all knobs, and Audsley's assignment.
+// factor of all wcets, and all knobs.
 #include <benchmark/benchmark.h>
 
 #include <vector>
 
-#include "redag_lab/search/assignment.hpp"
 #include "redag_lab/search/sensitivity.hpp"
 #include "redag_lab/workload/generate.hpp"
 
@@ -67,15 +66,8 @@ void BM_Sensitivity(benchmark::State &state) {
   });
 }
 
-void BM_Assign(benchmark::State &state) {
-  on_sets(state, [](const Workload &workload, const analysis::AnalysisPlatform &platform) {
-    benchmark::DoNotOptimize(lab::assign(workload, platform));
-  });
-}
-
 }  // namespace
 
 BENCHMARK(BM_ShownSchedulable)->Arg(1)->Arg(4);
 BENCHMARK(BM_CriticalScalingFactor)->Arg(1)->Arg(4);
 BENCHMARK(BM_Sensitivity)->Arg(1)->Arg(4)->Unit(benchmark::kMillisecond);
-BENCHMARK(BM_Assign)->Arg(1)->Arg(4)->Unit(benchmark::kMillisecond);

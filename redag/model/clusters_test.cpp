@@ -62,14 +62,10 @@ TEST(Clusters, HaveAWorkerForEachProcessorByDefault) {
       << to_string(more->warnings);
 }
 
-TEST(Clusters, ADagNeedsToNameOneOfSeveral) {
+TEST(Clusters, TheOnlyClusterNeedsNoName) {
   const Result<LoadedWorkload> only = parse_workload(one_cluster("name: all, workers: 4"), "w.yaml");
   ASSERT_TRUE(only) << to_string(only.error());
   EXPECT_EQ(cluster_of(only->workload.platform, only->workload.dags[0]), 0U);
-  const Result<LoadedWorkload> open = parse_workload(kTwo + dags({""}), "w.yaml", {.cluster_optional = true});
-  ASSERT_TRUE(open) << to_string(open.error());
-  EXPECT_EQ(to_string(open->warnings), "");
-  EXPECT_EQ(cluster_of(open->workload.platform, open->workload.dags[0]), std::nullopt);
 }
 
 struct Refused {

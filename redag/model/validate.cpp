@@ -179,7 +179,7 @@ class Checker {
     const std::vector<Cluster> &clusters = workload_.platform.clusters;
     if (cluster_of(workload_.platform, dag)) return;
     if (dag.cluster.empty()) {
-      if (clusters.empty() || options_.cluster_optional) return;
+      if (clusters.empty()) return;
       findings_.error(Field::Cluster, Field::Clusters, fmt::format("DAG '{}' has no cluster", dag.name),
                       "add 'cluster:' with " + names_of_clusters());
     } else if (clusters.empty()) {
@@ -570,7 +570,7 @@ class Checker {
     for (std::uint32_t c = 0; c < platform.clusters.size(); ++c) {
       const Cluster &cluster = platform.clusters[c];
       check_load(loads[c], cluster.workers, fmt::format(" of cluster '{}'", cluster.name), c);
-      if (serves[c] || options_.cluster_optional) continue;
+      if (serves[c]) continue;
       findings_
           .warning(Field::Clusters, FieldSet(Field::Cluster) | Field::Dags | Field::Name,
                    fmt::format("no DAG is in cluster '{}'", cluster.name))

@@ -115,8 +115,6 @@ struct Finding {
 struct ValidateOptions {
   /// Allows a task with a callback to have no wcet (0), because it is yet to be measured.
   bool wcet_optional = false;
-  /// Allows a DAG to name none of several clusters, because its cluster is yet to be found.
-  bool cluster_optional = false;
   /// Allows tasks to wait without a worker. What does not know waits must not get such a workload.
   bool waits = false;
   /// Workers of a file that states none.

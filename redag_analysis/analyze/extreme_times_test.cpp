@@ -14,7 +14,7 @@
 #include "redag_analysis/analyze/chains.hpp"
 #include "redag_analysis/analyze/executors.hpp"
 #include "redag_analysis/core/arithmetic.hpp"
-#include "redag_lab/search/assignment.hpp"
+#include "redag_lab/search/audsley.hpp"
 #include "redag_lab/search/sensitivity.hpp"
 #include "redag_testing/bound_property.hpp"
 #include "redag_testing/exploration/exploration.hpp"
@@ -205,12 +205,12 @@ TEST(ExtremeTimes, NoSearchWraps) {
       if (!margin) break;
     }
     analyses = 0;
-    lab::AssignmentOptions options;
-    options.exhaustive = 8;
-    options.restarts = 0;
-    options.stop = enough;
-    const Result<lab::Assignment> assignment = lab::assign(drawn.workload, drawn.platform, options);
-    EXPECT_TRUE(assignment || !assignment.error().empty());
+    if (const lab::TestChoice choice = lab::order_free_test(drawn.workload, drawn.platform); choice.test) {
+      const auto lateness = [](Duration response, Duration due) { return static_cast<double>(response - due); };
+      const auto found =
+          lab::audsley(drawn.workload, drawn.platform, *choice.test, lab::all_orders(*task_set), lateness, enough);
+      EXPECT_TRUE(!found || found->order.size() == task_set->units.size());
+    }
     if (!why_not_explore(*task_set)) {
       for (const auto &ranges : explore(*task_set, 1000).responses) {
         for (const ResponseRange &range : ranges) EXPECT_GE(range.worst, 0);

@@ -1,10 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The search shared by `assign` and `tune`, over points with one of several values in each dimension. Small spaces are
-// tried completely. In larger ones, one dimension at a time moves to its best value until nothing improves, from
-// several starts. Points are scored in batches, which can run in parallel without effect on the result. Pure, apart
-// from the callbacks.
+// The search of `tune`, over points with one of several values in each dimension. Small spaces are tried completely. In
+// larger ones, one dimension at a time moves to its best value until nothing improves, from several starts. Points are
+// scored in batches, which can run in parallel without effect on the result. Pure, apart from the callbacks.
 #pragma once
 
 #include <algorithm>
@@ -16,6 +15,7 @@
 #include <vector>
 
 #include "redag/base/rng.hpp"
+#include "redag_lab/search/score.hpp"
 
 namespace redag::lab {
 
@@ -43,7 +43,6 @@ struct SearchEffort {
   std::uint64_t seed = 1;
 };
 
-template <class Score>
 class CoordinateSearch {
  public:
   /// Returns the scores of the points, in their order. Fewer scores than points end the search.

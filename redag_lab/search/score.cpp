@@ -7,7 +7,6 @@
 
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
-#include "redag_analysis/core/arithmetic.hpp"
 #include "redag_analysis/metrics/deadline_watch.hpp"
 
 namespace redag::lab {
@@ -25,29 +24,15 @@ int compare(const Extremes &a, const Extremes &b, Objective objective) {
   return order(b.least_slack, a.least_slack);
 }
 
-int compare(const BoundScore &a, const BoundScore &b, Objective objective) {
-  if (a.schedulable != b.schedulable) return a.schedulable ? -1 : 1;
-  if (const int unbounded = order(a.unbounded, b.unbounded); unbounded != 0) return unbounded;
-  return compare(a.extremes, b.extremes, objective);
-}
-
-int compare(const ClassScore &a, const ClassScore &b, Objective objective) {
+int compare(const Score &a, const Score &b, Objective objective) {
+  if (a.proven != b.proven) return a.proven ? -1 : 1;
   if (objective == Objective::Misses) return order(a.missed, b.missed);
   if (const int lost = order(a.lost, b.lost); lost != 0) return lost;
   return compare(a.extremes, b.extremes, objective);
 }
 
-int compare(const RunScore &a, const RunScore &b, const Goal &goal) {
-  if (a.proven != b.proven) return a.proven ? -1 : 1;
-  if (!goal.per_criticality) return compare(a.all(), b.all(), goal.objective);
-  for (std::size_t c = kCriticalities; c-- > 0;) {
-    if (const int better = compare(a.of[c], b.of[c], goal.objective); better != 0) return better;
-  }
-  return 0;
-}
-
-void count(const metrics::JudgedJob &job, Duration deadline, Duration end_to_end, ClassScore &score) {
-  ++score.released;
+void count(const metrics::JudgedJob &job, Duration deadline, Duration end_to_end, Score &score) {
+  ++score.judged;
   if (job.miss != metrics::Miss::None) ++score.missed;
   if (job.miss == metrics::Miss::Lost) ++score.lost;
   // A job in flight before its deadline has an unknown lateness.
@@ -81,17 +66,25 @@ void Extremes::add(const Extremes &other) {
   any = true;
 }
 
-BoundScore score_of(const analysis::TaskSet &task_set) {
+void Score::add(const Score &run) {
+  judged += run.judged;
+  missed += run.missed;
+  lost += run.lost;
+  extremes.add(run.extremes);
+}
+
+Score score_of_bounds(const analysis::TaskSet &task_set) {
   const analysis::Report report = analysis::analyze(task_set);
-  BoundScore score;
-  score.schedulable = report.verdict == analysis::Verdict::Schedulable;
+  Score score;
+  score.proven = report.verdict == analysis::Verdict::Schedulable;
   const auto see = [&score](const analysis::Tightest &tightest, Duration due) {
+    ++score.judged;
+    if (!tightest.response || *tightest.response > due) ++score.missed;
     if (!tightest.response) {
-      ++score.unbounded;
-      return;
+      ++score.lost;
+    } else {
+      score.extremes.see(*tightest.response, due);
     }
-    score.extremes.see(*tightest.response, due);
-    score.total = analysis::add(score.total, *tightest.response);
   };
   for (std::size_t t = 0; t < task_set.tasks.size(); ++t) {
     see(report.tasks[t], std::min(task_set.tasks[t].deadline, task_set.tasks[t].limit));
@@ -102,39 +95,16 @@ BoundScore score_of(const analysis::TaskSet &task_set) {
   return score;
 }
 
-bool improves(const BoundScore &a, const BoundScore &b, Objective objective) { return compare(a, b, objective) < 0; }
+bool improves(const Score &a, const Score &b, Objective objective) { return compare(a, b, objective) < 0; }
 
-bool is_better(const BoundScore &a, const BoundScore &b, Objective objective) {
-  const int better = compare(a, b, objective);
-  return better != 0 ? better < 0 : a.total < b.total;
-}
-
-void ClassScore::add(const ClassScore &other) {
-  released += other.released;
-  missed += other.missed;
-  lost += other.lost;
-  extremes.add(other.extremes);
-}
-
-ClassScore RunScore::all() const {
-  ClassScore sum;
-  for (const ClassScore &each : of) sum.add(each);
-  return sum;
-}
-
-bool improves(const RunScore &a, const RunScore &b, const Goal &goal) { return compare(a, b, goal) < 0; }
-
-bool is_better(const RunScore &a, const RunScore &b, const Goal &goal) {
-  if (const int better = compare(a, b, goal); better != 0) return better < 0;
-  const double slack_a = a.all().extremes.least_slack;
-  const double slack_b = b.all().extremes.least_slack;
-  if (slack_a != slack_b) return slack_a > slack_b;
+bool is_better(const Score &a, const Score &b, Objective objective) {
+  if (const int better = compare(a, b, objective); better != 0) return better < 0;
+  if (a.extremes.least_slack != b.extremes.least_slack) return a.extremes.least_slack > b.extremes.least_slack;
   return a.changes < b.changes;
 }
 
-std::optional<std::array<ClassScore, kCriticalities>> simulate_once(const Workload &workload, std::uint64_t seed,
-                                                                    const Simulation &simulation,
-                                                                    const std::atomic<bool> *stop) {
+std::optional<Score> score_of_run(const Workload &workload, std::uint64_t seed, const Simulation &simulation,
+                                  const std::atomic<bool> *stop) {
   const sched::Config config = sched::config_of(workload);
   sched::PriorityScheduler scheduler(workload, config);
   sim::Options options;
@@ -143,11 +113,11 @@ std::optional<std::array<ClassScore, kCriticalities>> simulate_once(const Worklo
   options.overheads = simulation.overheads;
 
   const std::vector<TaskRef> tasks = flatten(workload);
-  std::array<ClassScore, kCriticalities> scores;
+  Score score;
   const auto see = [&](const metrics::JudgedJob &job) {
     const TaskRef &task = tasks[job.record.task.value];
     const Dag &dag = workload.dags[task.dag.value];
-    count(job, task.task->deadline, dag.deadline, scores[static_cast<std::size_t>(dag.criticality)]);
+    count(job, task.task->deadline, dag.deadline, score);
   };
   metrics::DeadlineWatch watch(workload);
   bool stopped = false;
@@ -159,7 +129,7 @@ std::optional<std::array<ClassScore, kCriticalities>> simulate_once(const Worklo
       });
   if (stopped) return std::nullopt;
   watch.finish(result.end, see);
-  return scores;
+  return score;
 }
 
 }  // namespace redag::lab

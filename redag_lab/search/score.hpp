@@ -1,12 +1,10 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What `assign` and `tune` look for: the objective, the score of a candidate by its bounds or by simulated runs, and
-// the comparison of two scores. Scores of runs are observations, not bounds: other seeds can be worse. Pure, apart from
-// `stop`.
+// What `tune` looks for: the objective, the score of a setting by its bounds or by simulated runs, and the comparison
+// of two scores. Scores of runs are observations, not bounds: other seeds can be worse. Pure, apart from `stop`.
 #pragma once
 
-#include <array>
 #include <atomic>
 #include <cstdint>
 #include <optional>
@@ -18,9 +16,9 @@
 namespace redag::lab {
 
 enum class Objective : std::uint8_t {
-  Misses,    // of runs: fewest jobs late or lost
-  Lateness,  // smallest maximum of response - deadline; of runs, fewer lost jobs (without a response) come first
-  Slack,     // largest minimum of (deadline - response) / deadline; lost jobs as above
+  Misses,    // fewest jobs late or lost; by bounds, fewest deadlines that are not shown to be met
+  Lateness,  // smallest maximum of response - deadline; fewer without a response come first
+  Slack,     // largest minimum of (deadline - response) / deadline; likewise
 };
 
 /// "misses", "lateness" or "slack".
@@ -37,69 +35,36 @@ struct Extremes {
   friend bool operator==(const Extremes &, const Extremes &) = default;
 };
 
-/// The quality of a workload by its bounds. The deadline counts as sooner where the next release would skip a job that
-/// has not started.
-struct BoundScore {
-  bool schedulable = false;
-  std::uint32_t unbounded = 0;  // tasks and DAGs with a deadline and no trusted bound
-  Extremes extremes;            // of the bounded tasks and DAGs
-  Duration total = 0;           // sum of bounds; breaks ties
+/// The quality of a setting: counts of jobs in simulated runs, or of tasks and DAGs with a deadline by their bounds. An
+/// end-to-end deadline counts as the deadline of the jobs that carry the data.
+struct Score {
+  bool proven = false;        // bounds show that every deadline is met
+  std::uint64_t judged = 0;   // jobs released, or deadlines
+  std::uint64_t missed = 0;   // lost or late; or not shown to be met
+  std::uint64_t lost = 0;     // skipped, or aborted although there was data; or without a bound
+  Extremes extremes;          // of those with a response, or a bound
+  std::uint32_t changes = 0;  // number of differences from the present workload
 
-  friend bool operator==(const BoundScore &, const BoundScore &) = default;
+  void add(const Score &run);
+  friend bool operator==(const Score &, const Score &) = default;
 };
 
-[[nodiscard]] BoundScore score_of(const analysis::TaskSet &task_set);
-
-/// True if `a` is better: schedulable, fewer without a bound, then the objective (Lateness or Slack). This justifies a
-/// change.
-[[nodiscard]] bool improves(const BoundScore &a, const BoundScore &b, Objective objective);
-/// As improves(); equals are decided by the smaller sum of bounds.
-[[nodiscard]] bool is_better(const BoundScore &a, const BoundScore &b, Objective objective);
-
-/// Counts of the jobs of one criticality (their DAG's). An end-to-end deadline counts as the deadline of the jobs that
-/// carry the data.
-struct ClassScore {
-  std::uint64_t released = 0;
-  std::uint64_t missed = 0;  // lost or late; a job in flight past its deadline is late
-  std::uint64_t lost = 0;    // skipped, or aborted although there was data
-  Extremes extremes;         // of the jobs with a response
-
-  void add(const ClassScore &other);
-  friend bool operator==(const ClassScore &, const ClassScore &) = default;
-};
-
-inline constexpr std::size_t kCriticalities = 3;
-
-/// The quality of a workload in simulated runs.
-struct RunScore {
-  std::array<ClassScore, kCriticalities> of;  // by Criticality
-  bool proven = false;                        // bounds show that every deadline is met
-  std::uint32_t changes = 0;                  // number of differences from the present workload
-
-  [[nodiscard]] ClassScore all() const;
-  friend bool operator==(const RunScore &, const RunScore &) = default;
-};
-
-struct Goal {
-  Objective objective = Objective::Misses;
-  /// A gain of a more critical DAG outweighs every loss of less critical ones.
-  bool per_criticality = false;
-};
-
-/// A proven setting wins, then the objective; true justifies a change.
-[[nodiscard]] bool improves(const RunScore &a, const RunScore &b, const Goal &goal);
-/// As improves(); equals are decided by more slack, then by fewer changes.
-[[nodiscard]] bool is_better(const RunScore &a, const RunScore &b, const Goal &goal);
+/// Returns the score of a task set by all bounds of analyze(). The deadline counts as sooner where the next release
+/// would skip a job that has not started.
+[[nodiscard]] Score score_of_bounds(const analysis::TaskSet &task_set);
 
 struct Simulation {
   Duration duration = 10 * kSecond;
   sim::Overheads overheads;
 };
 
-/// Simulates one run with our scheduler. Returns nothing if `stop` ended it.
-[[nodiscard]] std::optional<std::array<ClassScore, kCriticalities>> simulate_once(const Workload &workload,
-                                                                                  std::uint64_t seed,
-                                                                                  const Simulation &simulation,
-                                                                                  const std::atomic<bool> *stop);
+/// Returns the score of one simulated run with our scheduler; nothing if `stop` ended it.
+[[nodiscard]] std::optional<Score> score_of_run(const Workload &workload, std::uint64_t seed,
+                                                const Simulation &simulation, const std::atomic<bool> *stop);
+
+/// A proven setting wins, then the objective; true justifies a change.
+[[nodiscard]] bool improves(const Score &a, const Score &b, Objective objective);
+/// As improves(); equals are decided by more slack, then by fewer changes.
+[[nodiscard]] bool is_better(const Score &a, const Score &b, Objective objective);
 
 }  // namespace redag::lab

@@ -1,16 +1,19 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The settings that `tune` may change, as one point of a search: workers, max_active of each DAG, and the order of DAGs
-// whose tasks share a priority. Pure functions.
+// The settings that `tune` may change, as one point of a search: workers, priorities, max_active of each DAG, and the
+// order of DAGs whose tasks share a priority. Pure functions.
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "redag/model/workload.hpp"
+#include "redag_analysis/core/task_set.hpp"
 #include "redag_lab/search/coordinate_search.hpp"
 
 namespace redag::lab {
@@ -18,32 +21,49 @@ namespace redag::lab {
 struct Freedom {
   bool workers = true;
   bool caps = true;
-  bool ties = true;
+  bool ties = true;  // has no effect together with priorities
+  bool priorities = false;
   std::uint32_t most_workers = 0;  // 0: the workload's number
-  /// Replaces cap_choices() for every DAG, whatever its present value.
+  /// Replaces the usual values for every DAG, whatever its present one.
   std::optional<std::pair<std::uint32_t, std::uint32_t>> cap_range;
 };
 
-/// Maps points to settings. A point holds the workers, the max_active of each DAG, and a Lehmer code of the ties. For
-/// each DAG that shares a priority with an earlier one, the code is the number of these that it precedes. Every order
-/// of the DAGs is one point.
+/// An order of priorities to try: the workload, apart from its max_active and workers.
+struct NamedOrder {
+  std::string name;  // "present", "rate_monotonic", "deadline_monotonic", "dkc", "audsley"
+  Workload workload;
+};
+
+/// Returns the orders worth trying, the present one first: by rates, by deadlines, D - k L on several workers, and
+/// Audsley's. Only the present one where the policy has no static priorities and the workload is schedulable. Requires
+/// a valid workload. `stop` is asked before every test of Audsley's assignment, which is left out if it ends there.
+[[nodiscard]] std::vector<NamedOrder> orders_to_try(const Workload &workload,
+                                                    const analysis::AnalysisPlatform &platform, Objective objective,
+                                                    const std::function<bool()> &stop = {});
+
+/// Maps points to settings. A point holds the workers, the position of the order, the max_active of each DAG, and a
+/// Lehmer code of the ties. For each DAG that shares a priority with an earlier one, the code is the number of these
+/// that it precedes. Every order of the DAGs is one point.
 class SettingSpace {
  public:
-  SettingSpace(const Workload &workload, const Freedom &freedom);
+  static constexpr std::size_t kOrder = 1;  // positions within a point; the workers come first
+  static constexpr std::size_t kCaps = 2;
+
+  /// `orders`: of orders_to_try(); the first is the workload itself.
+  SettingSpace(const Workload &workload, const Freedom &freedom, std::vector<NamedOrder> orders);
 
   /// The first start is the present workload.
   [[nodiscard]] const SearchSpace &space() const { return space_; }
 
   [[nodiscard]] Workload apply(const Point &point) const;
-  [[nodiscard]] std::uint32_t workers(const Point &point) const { return point.front(); }
-  [[nodiscard]] Point caps(const Point &point) const;
+  [[nodiscard]] const std::vector<NamedOrder> &orders() const { return orders_; }
   /// Returns the positions of the DAGs that tie with others, in the order of precedence.
   [[nodiscard]] std::vector<std::uint32_t> tie_order(const Point &point) const;
   /// Returns the number of coordinates that differ from the present workload.
   [[nodiscard]] std::size_t changes(const Point &point) const;
 
  private:
-  const Workload &workload_;
+  std::vector<NamedOrder> orders_;
   std::vector<std::uint32_t> tied_;  // DAGs with a choice, in order of position
   SearchSpace space_;
 };

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Finds better workers, max_active and tie order for a workload. Candidates are judged by simulations with several
-// seeds and by the bounds, and the winner is validated on unseen seeds. Parallel (oneTBB); the result is the same for
-// every number of processors.
+// Finds better workers, priorities, max_active and tie order for a workload. Settings are judged by the bounds alone,
+// or by simulations with several seeds. Then those that the bounds prove come first, and the winner is validated on
+// unseen seeds. Parallel (oneTBB); the result is the same for every number of processors.
 #pragma once
 
 #include <atomic>
@@ -21,13 +21,18 @@
 
 namespace redag::lab {
 
+enum class Judge : std::uint8_t { Simulation, Bounds };
+
+/// "simulation" or "bounds".
+[[nodiscard]] const char *to_string(Judge judge);
+
 struct TuneOptions {
-  Goal goal;
+  Judge judge = Judge::Simulation;
+  Objective objective = Objective::Misses;
   Freedom freedom;
   Simulation simulation;
   std::optional<Overheads> machine;  // charged to the bounds instead of the simulated overheads
-  bool bounds = true;                // proven settings win over unproven ones
-  std::uint32_t seeds = 5;           // simulated for each candidate: seed, seed + 1, ...
+  std::uint32_t seeds = 5;           // simulated for each setting: seed, seed + 1, ...
   std::uint32_t held_out = 10;       // the number of unseen seeds after these, for the verdict
   SearchEffort effort = {1024, 4, 1};
   std::uint64_t seed = 1;
@@ -39,16 +44,17 @@ struct TuneOptions {
 struct SettingCandidate {
   Point point;
   Workload workload;
-  RunScore score;                       // on the seeds of the search
-  RunScore held_out;                    // on the unseen seeds; a default RunScore if there are none
-  std::vector<RunScore> held_out_runs;  // per unseen seed
+  Score score;                       // by the bounds, or on the seeds of the search
+  Score held_out;                    // on the unseen seeds; a default Score if there are none
+  std::vector<Score> held_out_runs;  // per unseen seed
 };
 
 struct Tuned {
   SettingCandidate present;
   SettingCandidate found;  // best of the search
   SettingCandidate best;   // `found` if it also holds on the unseen seeds, else `present`
-  std::map<Point, RunScore> trials;
+  std::map<Point, Score> trials;
+  std::vector<std::string> orders;  // names, by the number in a point
   bool exhaustive = true;
   bool stopped = false;
   bool varies = true;  // execution times or jitter vary, and runs of different seeds differ
@@ -58,9 +64,9 @@ struct Tuned {
   [[nodiscard]] bool rejected() const { return found.point != present.point && !changed(); }
 };
 
-/// Tunes a workload. Requires a valid workload and at least one seed. The result is never worse than `workload` by the
-/// goal, neither on the seeds of the search nor on the unseen ones. Returns nothing if stopped before `workload` itself
-/// was judged.
+/// Tunes a workload. Requires a valid workload, and at least one seed for simulations. The result is never worse than
+/// `workload` by the goal, neither on the seeds of the search nor on the unseen ones. Returns nothing if stopped before
+/// `workload` itself was judged.
 [[nodiscard]] std::optional<Tuned> tune(const Workload &workload, const TuneOptions &options);
 
 }  // namespace redag::lab

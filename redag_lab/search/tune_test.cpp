@@ -9,13 +9,17 @@
 #include <set>
 
 #include "redag/model/validate.hpp"
+#include "redag/model/workload_yaml.hpp"
+#include "redag_testing/bound_property.hpp"
 #include "redag_testing/builders.hpp"
 
 namespace redag::lab {
 namespace {
 
+using testing::independent;
 using testing::make_dag;
 using testing::make_workload;
+using testing::tick_dag;
 
 // Returns a small and often overloaded workload, for which some setting matters. Apart from contended(): with two or
 // three DAGs of at most three tasks, the search can try all settings.
@@ -29,7 +33,6 @@ Workload random_workload(std::uint64_t seed) {
     if (rng.uniform(0, 1) == 1) tasks.push_back({"l", 0, rng.uniform(1, 5), {0}});
     if (rng.uniform(0, 1) == 1) tasks.push_back({"r", 0, rng.uniform(1, 5), {0}});
     dags.push_back(make_dag("d" + std::to_string(d), tasks));
-    dags.back().criticality = static_cast<Criticality>(rng.uniform(0, 2));
   }
   Workload workload = make_workload(std::move(dags), static_cast<std::uint32_t>(rng.uniform(1, 2)),
                                     rng.uniform(0, 1) == 0 ? PreemptionMode::None : PreemptionMode::Os);
@@ -44,20 +47,30 @@ Workload random_workload(std::uint64_t seed) {
 
 TuneOptions quick(Objective objective = Objective::Misses) {
   TuneOptions options;
-  options.goal.objective = objective;
+  options.objective = objective;
   options.simulation.duration = 400 * kMillisecond;
   options.seeds = 2;
   options.held_out = 3;
   return options;
 }
 
-RunScore score_of(const Workload &workload, const TuneOptions &options, std::uint64_t first_seed, std::uint32_t seeds) {
-  RunScore score;
+Score score_of(const Workload &workload, const TuneOptions &options, std::uint64_t first_seed, std::uint32_t seeds) {
+  Score score;
   for (std::uint32_t s = 0; s < seeds; ++s) {
-    const auto run = simulate_once(workload, first_seed + s, options.simulation, nullptr);
-    for (std::size_t c = 0; c < kCriticalities; ++c) score.of[c].add((*run)[c]);
+    score.add(*score_of_run(workload, first_seed + s, options.simulation, nullptr));
   }
   return score;
+}
+
+// Returns the settings of a workload whose priorities do not change.
+SettingSpace settings_of(const Workload &workload, const Freedom &freedom) {
+  return {workload, freedom, {{"present", workload}}};
+}
+
+Freedom only_ties() {
+  Freedom freedom;
+  freedom.workers = freedom.caps = false;
+  return freedom;
 }
 
 std::vector<Point> all_points(const SettingSpace &settings) {
@@ -80,20 +93,18 @@ TEST(Tune, NeverReturnsWorseThanItWasGiven) {
   for (std::uint64_t i = 0; i < 60; ++i) {
     const Workload workload = random_workload(i);
     TuneOptions options = quick(static_cast<Objective>(i % 3));
-    options.goal.per_criticality = i % 2 == 0;
-    options.bounds = i % 5 == 0;
     options.effort.exhaustive = i % 4 == 0 ? 0 : 1024;
     const auto tuned = tune(workload, options);
     ASSERT_TRUE(tuned);
     EXPECT_EQ(tuned->present.workload, workload);
     // Computes the scores again from the resulting workload alone.
     const auto judged = [&](const SettingCandidate &candidate, std::uint64_t first, std::uint32_t seeds) {
-      RunScore score = score_of(candidate.workload, options, first, seeds);
+      Score score = score_of(candidate.workload, options, first, seeds);
       score.proven = candidate.score.proven;
       return score;
     };
-    EXPECT_FALSE(improves(judged(tuned->present, 1, 2), judged(tuned->best, 1, 2), options.goal)) << i;
-    EXPECT_FALSE(improves(judged(tuned->present, 3, 3), judged(tuned->best, 3, 3), options.goal)) << i;
+    EXPECT_FALSE(improves(judged(tuned->present, 1, 2), judged(tuned->best, 1, 2), options.objective)) << i;
+    EXPECT_FALSE(improves(judged(tuned->present, 3, 3), judged(tuned->best, 3, 3), options.objective)) << i;
     EXPECT_FALSE(has_errors(validate(tuned->best.workload)));
     changed += tuned->changed() ? 1 : 0;
   }
@@ -104,20 +115,22 @@ TEST(Tune, TheBestIsThatOfBruteForce) {
   for (std::uint64_t i = 0; i < 15; ++i) {
     const Workload workload = random_workload(100 + i);
     TuneOptions options = quick(static_cast<Objective>(i % 3));
-    options.bounds = false;
     options.held_out = 0;
-    const SettingSpace settings(workload, options.freedom);
-    std::optional<RunScore> best;
+    const SettingSpace settings = settings_of(workload, options.freedom);
+    std::optional<Score> best;
     for (const Point &point : all_points(settings)) {
-      const RunScore score = score_of(settings.apply(point), options, 1, 2);
-      if (!best || improves(score, *best, options.goal)) best = score;
+      const Workload candidate = settings.apply(point);
+      Score score = score_of(candidate, options, 1, 2);
+      const auto task_set = analysis::compile(candidate, analysis::platform_of(candidate));
+      score.proven = score.missed == 0 && task_set && score_of_bounds(*task_set).proven;
+      if (!best || improves(score, *best, options.objective)) best = score;
     }
     const auto tuned = tune(workload, options);
     ASSERT_TRUE(tuned);
     EXPECT_TRUE(tuned->exhaustive);
     EXPECT_EQ(tuned->trials.size(), all_points(settings).size());
-    EXPECT_FALSE(improves(*best, tuned->best.score, options.goal)) << i;
-    EXPECT_FALSE(improves(tuned->best.score, *best, options.goal)) << i;
+    EXPECT_FALSE(improves(*best, tuned->best.score, options.objective)) << i;
+    EXPECT_FALSE(improves(tuned->best.score, *best, options.objective)) << i;
   }
 }
 
@@ -126,14 +139,13 @@ TEST(Tune, LocalSearchIsNeverBelowItsStartsAndMostlyFindsTheBest) {
   for (std::uint64_t i = 0; i < 15; ++i) {
     const Workload workload = random_workload(200 + i);
     TuneOptions options = quick();
-    options.bounds = false;
     options.held_out = 0;
     const auto exact = tune(workload, options);
     options.effort.exhaustive = 0;
     const auto local = tune(workload, options);
     EXPECT_FALSE(local->exhaustive);
-    EXPECT_FALSE(improves(local->best.score, exact->best.score, options.goal));
-    equal += improves(exact->best.score, local->best.score, options.goal) ? 0 : 1;
+    EXPECT_FALSE(improves(local->best.score, exact->best.score, options.objective));
+    equal += improves(exact->best.score, local->best.score, options.objective) ? 0 : 1;
   }
   EXPECT_GE(equal, 13);
 }
@@ -161,8 +173,8 @@ TEST(Tune, TieOrder) {
   options.freedom.workers = false;
   const auto tuned = tune(tie(), options);
   ASSERT_TRUE(tuned->changed());
-  EXPECT_EQ(tuned->present.score.all().missed, 40U);
-  EXPECT_EQ(tuned->best.score.all().missed, 0U);
+  EXPECT_EQ(tuned->present.score.missed, 40U);
+  EXPECT_EQ(tuned->best.score.missed, 0U);
   EXPECT_TRUE(tuned->best.score.proven);
   EXPECT_EQ(tuned->best.workload.policy, PolicyKind::Fixed);
   EXPECT_GT(*tuned->best.workload.dags[1].tasks[0].priority, *tuned->best.workload.dags[0].tasks[0].priority);
@@ -183,7 +195,7 @@ TEST(Tune, WhatVariesIsDecidedByTheWorkload) {
   task.bcet = task.wcet / 2;
   const auto tuned = tune(workload, quick());
   EXPECT_TRUE(tuned->varies);
-  EXPECT_EQ(tuned->best.score.all().missed, 0U);
+  EXPECT_EQ(tuned->best.score.missed, 0U);
   task.execution = {};
   task.jitter = kMillisecond;
   EXPECT_TRUE(tune(workload, quick())->varies);
@@ -192,7 +204,6 @@ TEST(Tune, WhatVariesIsDecidedByTheWorkload) {
 TEST(Tune, WorkersWithinTheLimit) {
   const Workload workload = tie();
   TuneOptions options = quick();
-  options.bounds = false;
   options.freedom.ties = false;
   EXPECT_FALSE(tune(workload, options)->changed());
   options.freedom.most_workers = 3;
@@ -200,35 +211,18 @@ TEST(Tune, WorkersWithinTheLimit) {
   EXPECT_EQ(tuned->best.workload.platform.workers, 2U);  // not three, which improve nothing further
 }
 
-TEST(Tune, TheMostCriticalFirst) {
-  // One worker has two jobs in 20 ms, and only one of them can be in time.
-  Workload workload = make_workload({make_dag("a", {{"t", 20, 8, {}, "", 0, 9}, {"u", 20, 1, {}, "", 0, 10}}),
-                                     make_dag("b", {{"t", 20, 4, {}, "", 0, 6}})},
-                                    1);
-  workload.dags[0].criticality = Criticality::Low;
-  workload.dags[1].criticality = Criticality::High;
-  TuneOptions options = quick();
-  options.goal.per_criticality = true;
-  const auto critical = tune(workload, options);
-  EXPECT_EQ(critical->best.score.of[static_cast<std::size_t>(Criticality::High)].missed, 0U);
-  EXPECT_EQ(critical->best.score.of[static_cast<std::size_t>(Criticality::Low)].missed, 80U);
-  options.goal.per_criticality = false;
-  const auto all = tune(workload, options);
-  EXPECT_EQ(all->best.score.all().missed, 40U);
-}
-
 TEST(Tune, AProofComesFirst) {
-  RunScore proven;
+  Score proven;
   proven.proven = true;
-  proven.of[1] = {10, 0, 0, -1, 0.1, true};
-  RunScore faster;
-  faster.of[1] = {10, 0, 0, -5, 0.5, true};
-  EXPECT_TRUE(improves(proven, faster, {Objective::Lateness, false}));
-  EXPECT_FALSE(improves(faster, proven, {Objective::Lateness, false}));
+  proven.extremes = {-1, 0.1, true};
+  Score faster;
+  faster.extremes = {-5, 0.5, true};
+  EXPECT_TRUE(improves(proven, faster, Objective::Lateness));
+  EXPECT_FALSE(improves(faster, proven, Objective::Lateness));
   faster.proven = true;
-  EXPECT_TRUE(improves(faster, proven, {Objective::Lateness, false}));
-  EXPECT_FALSE(improves(faster, proven, {Objective::Misses, false}));
-  EXPECT_TRUE(is_better(faster, proven, {Objective::Misses, false}));
+  EXPECT_TRUE(improves(faster, proven, Objective::Lateness));
+  EXPECT_FALSE(improves(faster, proven, Objective::Misses));
+  EXPECT_TRUE(is_better(faster, proven, Objective::Misses));
 }
 
 TEST(Tune, StoppedBeforeAnything) {
@@ -255,7 +249,7 @@ TEST(Setting, EveryOrderOfTiedDagsOnce) {
   Workload workload = make_workload(
       {make_dag("a", {{"t", 10}}), make_dag("b", {{"t", 10}}), make_dag("c", {{"t", 20}}), make_dag("d", {{"t", 10}})},
       1);
-  const SettingSpace settings(workload, {false, false, true, 0, {}});
+  const SettingSpace settings = settings_of(workload, only_ties());
   std::set<std::vector<std::uint32_t>> orders;
   for (const Point &point : all_points(settings)) orders.insert(settings.tie_order(point));
   EXPECT_EQ(orders.size(), 6U);
@@ -267,7 +261,7 @@ TEST(Setting, EveryOrderOfTiedDagsOnce) {
 TEST(Setting, AnOtherOrderKeepsTheRates) {
   Workload workload =
       make_workload({make_dag("a", {{"t", 10}, {"u", 0, 1, {0}}}), make_dag("b", {{"t", 10}, {"v", 5}})}, 1);
-  const SettingSpace settings(workload, {false, false, true, 0, {}});
+  const SettingSpace settings = settings_of(workload, only_ties());
   Point point = settings.space().starts.front();
   point.back() = 1;
   const Workload other = settings.apply(point);
@@ -283,9 +277,129 @@ TEST(Setting, TheRangeOfCaps) {
   Freedom freedom;
   freedom.workers = freedom.ties = false;
   freedom.cap_range = {2, 5};
-  const SettingSpace settings(workload, freedom);
-  EXPECT_THAT(settings.space().values[1], ::testing::ElementsAre(0, 2, 3, 4, 5));
+  const SettingSpace settings = settings_of(workload, freedom);
+  EXPECT_THAT(settings.space().values[SettingSpace::kCaps], ::testing::ElementsAre(0, 2, 3, 4, 5));
   EXPECT_THAT(settings.space().values[0], ::testing::ElementsAre(4));
+}
+
+// ---- judged by the bounds ----
+
+Tuned by_bounds(const Workload &workload, Objective objective = Objective::Lateness) {
+  TuneOptions options;
+  options.judge = Judge::Bounds;
+  options.objective = objective;
+  options.freedom.workers = false;
+  options.freedom.priorities = true;
+  return *tune(workload, options);
+}
+
+std::string order_of(const Tuned &tuned) { return tuned.orders[tuned.best.point[SettingSpace::kOrder]]; }
+
+TEST(TuneByBounds, ShortDeadlinesGoFirst) {
+  // By rate, b waits for a and responds after 5. By deadline, it responds after 2.
+  const Tuned tuned = by_bounds(independent({{3, 10}, {2, 20, 4}}));
+  EXPECT_FALSE(tuned.present.score.proven);
+  EXPECT_EQ(tuned.present.score.missed, 1U);
+  EXPECT_EQ(tuned.present.score.extremes.worst_lateness, 1);
+  EXPECT_TRUE(tuned.best.score.proven);
+  EXPECT_EQ(order_of(tuned), "deadline_monotonic");
+  EXPECT_EQ(tuned.best.score.extremes.worst_lateness, -2);
+  EXPECT_EQ(tuned.best.workload.policy, PolicyKind::DeadlineMonotonic);
+}
+
+TEST(TuneByBounds, AudsleyBeatsDeadlinesLongerThanPeriods) {
+  // From J. Lehoczky, RTSS 1990: with D > T, neither rates nor deadlines decide. With (52, 100, D = 110) above (52,
+  // 140, D = 154), the second responds after 156. In the other order the responses are 108 and 52.
+  Workload workload = independent({{52, 100, 110}, {52, 140, 154}});
+  for (Dag &dag : workload.dags) {
+    dag.tasks[0].overrun = Overrun::Queue;
+    dag.tasks[0].queue_depth = 2;
+  }
+  const Tuned tuned = by_bounds(workload);
+  EXPECT_FALSE(tuned.present.score.proven);
+  EXPECT_EQ(order_of(tuned), "audsley");
+  EXPECT_TRUE(tuned.best.score.proven);
+  EXPECT_EQ(tuned.best.score.extremes.worst_lateness, -2);
+  EXPECT_EQ(tuned.best.workload.policy, PolicyKind::Fixed);
+  EXPECT_GT(tuned.best.workload.dags[1].tasks[0].priority, tuned.best.workload.dags[0].tasks[0].priority);
+}
+
+TEST(TuneByBounds, LeavesAloneWhatNothingImproves) {
+  const Workload workload = independent({{1, 4}, {1, 8}});
+  for (const Objective objective : {Objective::Misses, Objective::Lateness, Objective::Slack}) {
+    EXPECT_EQ(by_bounds(workload, objective).best.workload, workload);
+  }
+  const Workload edf = independent({{3, 10}, {2, 20, 4}}, 1, PolicyKind::Edf);
+  const Tuned tuned = by_bounds(edf);
+  EXPECT_TRUE(tuned.present.score.proven);
+  EXPECT_EQ(tuned.best.workload, edf) << "no static priorities for what edf shows";
+}
+
+TEST(TuneByBounds, FewerWithoutABoundComeFirst) {
+  Score one;
+  one.lost = 1;
+  one.extremes = {5, 0, true};
+  Score two;
+  two.lost = 2;
+  two.extremes = {-5, 1, true};
+  EXPECT_TRUE(is_better(one, two, Objective::Lateness));
+  EXPECT_TRUE(is_better(one, two, Objective::Slack));
+}
+
+TEST(TuneByBounds, ABoundOfActiveJobsIsolatesADag) {
+  // On 3 workers, without preemption, "wide" can fill all workers and block "quick" for 40. With at most 2 active jobs
+  // of "wide", "quick" always finds a worker.
+  const std::vector<testing::TestTask> wide = {
+      {"source", 400, 40}, {"a", 0, 40, {0}}, {"b", 0, 40, {0}}, {"c", 0, 40, {0}}, {"d", 0, 40, {0}}};
+  const Workload workload = make_workload({tick_dag("quick", {{"t", 20, 2}}), tick_dag("wide", wide)}, 3);
+  const Tuned tuned = by_bounds(workload);
+  EXPECT_FALSE(tuned.present.score.proven);
+  EXPECT_TRUE(tuned.best.score.proven);
+  EXPECT_EQ(tuned.best.workload.dags[0].max_active, 0U);
+  EXPECT_EQ(tuned.best.workload.dags[1].max_active, 2U);
+  EXPECT_TRUE(tuned.exhaustive);
+  EXPECT_EQ(tuned.trials.size(), 4U * tuned.orders.size()) << "none, 1, 2, 3 for wide";
+}
+
+TEST(TuneByBounds, NeverWorseAndWhatIsWrittenMeansTheSame) {
+  const auto cases = static_cast<int>(testing::how_many(150));
+  int better = 0;
+  for (int i = 0; i < cases; ++i) {
+    Rng rng(mix(static_cast<std::uint64_t>(i) + 901));
+    testing::BoundCaseLimits limits;
+    limits.max_workers = 3;
+    limits.edges = i % 2 == 0;
+    limits.caps = true;
+    limits.max_dags = 4;
+    limits.preemption = i % 3 == 0 ? sched::Preemption::None : sched::Preemption::Full;
+    limits.policies = {PolicyKind::RateMonotonic, PolicyKind::Fixed, PolicyKind::ChainAware, PolicyKind::Edf};
+    testing::BoundCase bound_case = testing::random_bound_case(rng, limits);
+    bound_case.workload.platform.preemption =
+        limits.preemption == sched::Preemption::None ? PreemptionMode::None : PreemptionMode::Os;
+    if (has_errors(validate(bound_case.workload))) continue;
+    SCOPED_TRACE(describe(bound_case));
+    for (const Objective objective : {Objective::Lateness, Objective::Slack}) {
+      const Tuned tuned = by_bounds(bound_case.workload, objective);
+      ASSERT_FALSE(improves(tuned.present.score, tuned.best.score, objective));
+      better += tuned.changed() ? 1 : 0;
+      // Written to YAML and read again, the workload has the same score. Only order and caps have changed.
+      const auto read = parse_workload(to_yaml(tuned.best.workload), "w.yaml");
+      ASSERT_TRUE(read) << to_string(read.error());
+      Score again = score_of_bounds(analysis::compile(read->workload, analysis::platform_of(read->workload)).value());
+      again.changes = tuned.best.score.changes;
+      ASSERT_EQ(again, tuned.best.score);
+      Workload undone = tuned.best.workload;
+      undone.policy = bound_case.workload.policy;
+      for (std::size_t d = 0; d < undone.dags.size(); ++d) {
+        undone.dags[d].max_active = bound_case.workload.dags[d].max_active;
+        for (std::size_t t = 0; t < undone.dags[d].tasks.size(); ++t) {
+          undone.dags[d].tasks[t].priority = bound_case.workload.dags[d].tasks[t].priority;
+        }
+      }
+      ASSERT_EQ(undone, bound_case.workload);
+    }
+  }
+  EXPECT_GT(better, 0);
 }
 
 }  // namespace

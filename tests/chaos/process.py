@@ -337,7 +337,7 @@ def little_memory(rng, folder):
     limit = (least_memory() + rng.randint(0, 152)) << 20
     command = rng.choice([["validate", file], ["simulate", file, "--duration", "5s", "--out", folder / "out"],
                           ["analyze", file], ["run", file, "--duration", "100ms", "--preemption", "none"],
-                          ["generate", "--dags", "20000"], ["assign", SOURCE / "workloads" / "robot.yaml"],
+                          ["generate", "--dags", "20000"], ["tune", "--judge", "bounds", SOURCE / "workloads" / "robot.yaml"],
                           ["experiment", "acceptance", "--sets", "5", "--utilization", "0.5", "--out", folder / "out"]])
     # 127: the loader had no room for the program's libraries.
     child = Child(*command, prepare=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit))).end(GOOD | {127})

@@ -102,7 +102,7 @@ class Combinations(Case):
         return result
 
     def test_numbers_that_mean_nothing(self):
-        for command in ("simulate", "run", "compare", "analyze", "sensitivity", "assign", "tune"):
+        for command in ("simulate", "run", "compare", "analyze", "sensitivity", "tune"):
             self.refuse(command, self.cart, "--workers", "0", says="--workers: '0' is not a whole number from 1 to 4096")
             self.refuse(command, self.cart, "--workers", "-1", says="--workers: '-1' is not a whole number from 1 to 4096")
         self.refuse("compare", self.cart, "--repeat", "0", says="--repeat: '0' is not a whole number from 1 to 10000")
@@ -153,7 +153,7 @@ class Combinations(Case):
         self.assertEqual(before, after)
 
     def test_outputs_are_looked_at_before_the_work(self):
-        for command, option in (("assign", "-o"), ("tune", "-o"), ("generate", "-o")):
+        for command, option in (("tune", "-o"), ("generate", "-o")):
             file = [] if command == "generate" else [self.cart]
             result = self.refuse(command, *file, option, self.folder, says=f"{self.folder}: error: cannot write")
             self.assertEqual(result.stdout, "")

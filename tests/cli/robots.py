@@ -66,7 +66,7 @@ dags:
         bound = {dag["name"]: dag["bound_ns"] for dag in document["dags"]}
         self.assertGreaterEqual(bound["drive/avoid"], bound["vision/camera"] + 500_000 + 1_200_000)
         self.expect(redag("simulate", linked, "--duration", "2s"), 0)
-        for command in (["tune"], ["assign"], ["sensitivity"]):
+        for command in (["tune"], ["sensitivity"]):
             self.assertIn(f"{command[0]} changes tasks", self.expect(redag(*command, linked), 2).stderr)
         for command in (["analyze", "--overhead-release", "1us"], ["simulate", "--workers", "3"]):
             self.assertIn("hold for the platform in its file", self.expect(redag(*command, linked), 2).stderr)

@@ -234,7 +234,7 @@ class Waits(Case):
 
     def test_tuned_and_assigned(self):
         tuned = self.folder / "tuned.yaml"
-        for command in (["tune", "--seeds", "2", "--duration", "1s"], ["assign", "--exhaustive", "20"]):
+        for command in (["tune", "--seeds", "2", "--duration", "1s"], ["tune", "--judge", "bounds", "--vary", "priorities"]):
             with self.subTest(command=command):
                 self.expect(redag(command[0], self.FILE, *command[1:], "-o", tuned), 0)
                 self.expect(redag("validate", tuned), 0)

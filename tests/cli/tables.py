@@ -119,7 +119,7 @@ class Tables(Case):
         self.agree("sensitivity", "sensitivity", self.long)
 
     def test_assign(self):
-        self.agree("assign", "assign", self.long)
+        self.agree("tune_by_bounds", "tune", "--judge", "bounds", self.long)
 
     def test_tune(self):
         self.agree("tune", "tune", self.long, "--duration", "200ms")

@@ -54,7 +54,7 @@ void commands_target(std::string_view input) {
   if (loaded->workload.task_count() > kMostTasks) return;
   const bool has_clusters = !loaded->workload.platform.clusters.empty();  // which sensitivity refuses
   REDAG_CHECK(has_clusters || answers({"sensitivity", file, "--json"}), "sensitivity");
-  REDAG_CHECK(answers({"assign", file, "--json"}), "assign");
+  REDAG_CHECK(answers({"tune", "--judge", "bounds", file, "--json"}), "tune --judge bounds");
 }
 
 }  // namespace redag::fuzz

@@ -53,7 +53,6 @@ void load(std::string_view input, LoadOptions options) {
 void workload_target(std::string_view input) {
   load(input, {});
   load(input, {.wcet_optional = true});
-  load(input, {.cluster_optional = true});
   load(input, {.waits = true});
 }
 

@@ -21,20 +21,21 @@ namespace redag::cli {
 namespace {
 
 constexpr std::uint32_t kMostSeeds = 10'000;
+const std::vector<std::string> kSettings = {"workers", "max_active", "order", "priorities"};
 
 struct TuneOptions {
   RunArguments run;
   lab::TuneOptions tune;
   std::string output;
-  std::string vary = "workers,max_active,order";
+  std::optional<lab::Objective> objective;
+  std::string vary;  // empty: as the judge has it
   std::string caps;
-  bool simulator_only = false;
   bool all_trials = false;
 };
 
 // Parses "workers,max_active", the settings that may change. Returns false after printing an error.
 bool parse_vary(const std::string &list, lab::Freedom &freedom, Console &console) {
-  freedom.workers = freedom.caps = freedom.ties = false;
+  freedom.workers = freedom.caps = freedom.ties = freedom.priorities = false;
   std::size_t begin = 0;
   while (begin <= list.size()) {
     const std::size_t end = std::min(list.find(',', begin), list.size());
@@ -45,9 +46,10 @@ bool parse_vary(const std::string &list, lab::Freedom &freedom, Console &console
       freedom.caps = true;
     } else if (name == "order") {
       freedom.ties = true;
+    } else if (name == "priorities") {
+      freedom.priorities = true;
     } else {
-      console.error(fmt::format("--vary: {} is not a valid choice", in_quotes(name)),
-                    suggestion(name, {"workers", "max_active", "order"}));
+      console.error(fmt::format("--vary: {} is not a valid choice", in_quotes(name)), suggestion(name, kSettings));
       return false;
     }
     begin = end + 1;
@@ -75,17 +77,10 @@ bool parse_caps(const std::string &text, lab::Freedom &freedom, Console &console
 
 std::optional<lab::Tuned> search(const Workload &workload, lab::TuneOptions options, Console &console) {
   Progress progress(console);
-  const lab::SettingSpace settings(workload, options.freedom);
-  const std::uint64_t size = settings.space().size(options.effort.exhaustive);
-  const Stopwatch watch;
   options.stop = &InterruptGuard::flag();
   options.progress = [&](std::uint64_t tried) {
     if (!progress.due()) return;
-    if (size <= options.effort.exhaustive) {
-      progress.draw(static_cast<double>(tried) / static_cast<double>(size), pace(tried, size, watch.elapsed()));
-    } else {
-      progress.draw(0, fmt::format("{} settings", format_count(tried)));
-    }
+    progress.draw(0, fmt::format("{} settings", format_count(tried)));
   };
   return lab::tune(workload, options);
 }
@@ -93,7 +88,9 @@ std::optional<lab::Tuned> search(const Workload &workload, lab::TuneOptions opti
 int tune_file(const TuneOptions &options, Console &console) {
   Tuning tuning;
   tuning.options = options.tune;
-  tuning.options.bounds = !options.simulator_only;
+  const bool by_bounds = options.tune.judge == lab::Judge::Bounds;
+  tuning.options.objective = options.objective.value_or(by_bounds ? lab::Objective::Lateness : lab::Objective::Misses);
+  if (by_bounds) tuning.options.held_out = 0;
   tuning.options.effort.seed = options.run.seed;
   tuning.options.seed = options.run.seed;
   if (options.run.seed + options.tune.seeds + options.tune.held_out < options.run.seed) {
@@ -101,7 +98,8 @@ int tune_file(const TuneOptions &options, Console &console) {
     return kExitBad;
   }
   tuning.options.simulation.overheads = options.run.overheads;
-  if (!parse_vary(options.vary, tuning.options.freedom, console) ||
+  const std::string usual = by_bounds ? "max_active,priorities" : "workers,max_active,order";
+  if (!parse_vary(options.vary.empty() ? usual : options.vary, tuning.options.freedom, console) ||
       !parse_caps(options.caps, tuning.options.freedom, console)) {
     return kExitBad;
   }
@@ -123,6 +121,13 @@ int tune_file(const TuneOptions &options, Console &console) {
     tuning.options.machine = *machine;
     tuning.options.simulation.overheads = sim::overheads_of(*machine);
   }
+  if (by_bounds) {
+    const Result<analysis::TaskSet> task_set = analysis::compile(*workload, analysis::platform_of(*workload));
+    if (!task_set) {
+      console.note(task_set.error());
+      return kExitBad;
+    }
+  }
   tuning.options.simulation.duration = options.run.duration.value_or(lab::sensible_duration(*workload));
 
   const InterruptGuard guard;  // covers writing the results too
@@ -140,8 +145,8 @@ int tune_file(const TuneOptions &options, Console &console) {
   }
   const lab::SettingCandidate &best = tuning.tuned.best;
   if (!write_changed(options.output, source, best.workload, console)) return kExitBad;
-  const bool missed = best.score.all().missed + best.held_out.all().missed > 0;
-  return options.run.check && missed ? kExitNo : kExitOk;
+  const bool holds = by_bounds ? best.score.proven : best.score.missed + best.held_out.missed == 0;
+  return options.run.check && !holds ? kExitNo : kExitOk;
 }
 
 }  // namespace
@@ -154,17 +159,17 @@ Action add_tune(CLI::App &app) {
       ->required();
   app.add_option("-o,--output", options->output, "File for the tuned workload: FILE with its changes")
       ->type_name("FILE");
-  const auto objective = [](lab::Objective value) { return std::pair(std::string(objective_name(value)), value); };
-  add_choice(app, "--objective", tune.goal.objective,
-             Choices<lab::Objective>{objective(lab::Objective::Misses), objective(lab::Objective::Lateness),
-                                     objective(lab::Objective::Slack)},
-             "Minimise late and lost jobs (misses) or the largest lateness (max_lateness), or maximise the smallest "
-             "share of a deadline that is left (slack)")
-      ->default_str(objective_name(tune.goal.objective));
-  app.add_flag("--per-criticality", tune.goal.per_criticality, "Compare settings by their most critical DAGs first");
-  app.add_option("--vary", options->vary, "What may change: workers, max_active, order (of DAGs with equal priority)")
-      ->type_name("LIST")
-      ->capture_default_str();
+  add_choice(app, "--judge", tune.judge, choices_of(std::array{lab::Judge::Simulation, lab::Judge::Bounds}),
+             "What decides which setting is better: simulated runs, or the bounds of 'redag analyze' alone")
+      ->default_str(to_string(tune.judge));
+  add_choice(app, "--objective", options->objective,
+             choices_of(std::array{lab::Objective::Misses, lab::Objective::Lateness, lab::Objective::Slack}),
+             "Minimise late and lost jobs (misses) or the largest lateness (lateness), or maximise the smallest share "
+             "of a deadline that is left (slack); by default misses, or lateness with the bounds as judge");
+  app.add_option("--vary", options->vary,
+                 "What may change: workers, max_active, order (of DAGs with equal priority), priorities; by default "
+                 "workers,max_active,order, or max_active,priorities with the bounds as judge")
+      ->type_name("LIST");
   app.add_option("--caps", options->caps,
                  "Values of max_active to try for every DAG (default: none, and all values that can matter)")
       ->type_name("LOW-HIGH");
@@ -175,15 +180,12 @@ Action add_tune(CLI::App &app) {
   add_count(app, "--held-out", tune.held_out, {0, kMostSeeds},
             "Number of unseen seeds for the validation of the result");
   add_seed(app, options->run.seed, "First seed, also of the local search");
-  app.add_flag("--simulator-only", options->simulator_only, "Do not analyse what the bounds prove");
-  add_count(app, "--exhaustive", tune.effort.exhaustive, {0, kMaxCombinations},
-            "Try all settings up to this number; above, search locally");
-  add_count(app, "--restarts", tune.effort.restarts, {0, kMaxRestarts},
-            "Number of random starting points of the local search");
   add_count(app, "--jobs", tune.jobs, {0, kMaxJobs}, "Processors to use; 0: all. The result does not depend on it");
   app.add_flag("--all-trials", options->all_trials, "Show every setting that was tried");
   app.add_flag("--json", options->run.json, "Write one JSON document, and nothing else, to standard output");
-  app.add_flag("--check", options->run.check, "Exit with status 1 if the best setting misses a deadline in simulation");
+  app.add_flag(
+      "--check", options->run.check,
+      "Exit with status 1 if the best setting misses a deadline in simulation, or is not shown to meet them all");
   add_platform_arguments(app, options->run);
   add_overhead_arguments(app, options->run, "Platform");
   return [options](Console &console) { return tune_file(*options, console); };

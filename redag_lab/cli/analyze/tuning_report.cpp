@@ -6,114 +6,141 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <span>
 
 #include "redag/base/text.hpp"
 #include "redag_analysis/text/table.hpp"
-#include "redag_lab/cli/analyze/score_text.hpp"
 #include "redag_lab/workload/changes.hpp"
 
 namespace redag::cli {
 namespace {
 
-using lab::ClassScore;
+using lab::Judge;
 using lab::Objective;
 using lab::Point;
-using lab::RunScore;
+using lab::Score;
 using lab::SettingCandidate;
+using lab::SettingSpace;
 using lab::Tuned;
 
 constexpr std::size_t kMostTrials = 10;
-constexpr Criticality kByUrgency[] = {Criticality::High, Criticality::Normal, Criticality::Low};
 
-double miss_ratio(const ClassScore &score) {
-  return score.released == 0 ? 0 : static_cast<double>(score.missed) / static_cast<double>(score.released);
+// Returns "-2.5 ms"; "-" if nothing was seen.
+std::string lateness_text(const lab::Extremes &extremes) {
+  if (!extremes.any) return "-";
+  const Duration lateness = extremes.worst_lateness;
+  return lateness < 0 ? "-" + humanize_duration(-lateness) : humanize_duration(lateness);
 }
 
-std::string miss_text(const ClassScore &score) {
+// Returns "12.3 %", rounded down so as not to overstate it; "-" if nothing was seen.
+std::string slack_text(const lab::Extremes &extremes) {
+  return extremes.any ? fmt::format("{:.1f} %", std::floor(extremes.least_slack * 1000 + 1e-9) / 10) : "-";
+}
+
+// Returns "control 1, lidar none": max_active by DAG. A DAG of one task without a bound has no choice and is left out.
+std::string caps_text(const Workload &workload, std::span<const std::uint32_t> caps) {
+  std::string text;
+  for (std::size_t d = 0; d < caps.size(); ++d) {
+    if (workload.dags[d].tasks.size() < 2 && caps[d] == 0) continue;
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", workload.dags[d].name, lab::bound_text(caps[d]));
+  }
+  return text.empty() ? "-" : text;
+}
+
+double miss_ratio(const Score &score) {
+  return score.judged == 0 ? 0 : static_cast<double>(score.missed) / static_cast<double>(score.judged);
+}
+
+std::string miss_text(const Score &score) {
   return score.missed == 0 ? "none"
                            : fmt::format("{} ({})", format_count(score.missed), format_percent(miss_ratio(score)));
 }
 
-std::string objective_text(const ClassScore &score, Objective objective) {
-  switch (objective) {
-    case Objective::Misses: return miss_text(score);
-    case Objective::Lateness:
-      return fmt::format("{} lost, {}", format_count(score.lost), lateness_text(score.extremes));
-    case Objective::Slack: return fmt::format("{} lost, {}", format_count(score.lost), slack_text(score.extremes));
-  }
-  return "?";
+std::string objective_text(const Score &score, const lab::TuneOptions &options) {
+  if (options.objective == Objective::Misses) return miss_text(score);
+  return fmt::format(
+      "{} {}, {}", format_count(score.lost), options.judge == Judge::Bounds ? "without a bound" : "lost",
+      options.objective == Objective::Lateness ? lateness_text(score.extremes) : slack_text(score.extremes));
 }
 
-bool has_classes(const RunScore &score) {
-  return std::count_if(score.of.begin(), score.of.end(), [](const ClassScore &each) { return each.released > 0; }) > 1;
+std::vector<Cell> score_cells(const Score &score) {
+  return {{score.proven ? "yes" : "no", score.proven ? Tint::Good : Tint::Plain},
+          {miss_text(score), score.missed > 0 ? Tint::Bad : Tint::Good},
+          {format_count(score.lost)},
+          {lateness_text(score.extremes)},
+          {slack_text(score.extremes)}};
 }
 
-std::vector<Cell> score_cells(const RunScore &score, bool bounds) {
-  const ClassScore all = score.all();
-  return {{bounds ? (score.proven ? "yes" : "no") : "-", score.proven ? Tint::Good : Tint::Plain},
-          {miss_text(all), all.missed > 0 ? Tint::Bad : Tint::Good},
-          {format_count(all.lost)},
-          {lateness_text(all.extremes)},
-          {slack_text(all.extremes)}};
+// Returns the columns of score_cells(). Jobs miss deadlines; of bounds, deadlines are not shown to be met.
+std::vector<Column> score_columns(const Tuning &tuning) {
+  const bool by_bounds = tuning.options.judge == Judge::Bounds;
+  return {{"proven", false, 5},
+          {by_bounds ? "not shown" : "missed", true, 8},
+          {by_bounds ? "no bound" : "lost", true, 2},
+          {by_bounds ? "worst lateness" : "max lateness", true, 7},
+          {"least slack", true, 6}};
+}
+
+Table table_of(std::vector<Column> columns, const Tuning &tuning) {
+  for (Column &column : score_columns(tuning)) columns.push_back(std::move(column));
+  return Table(std::move(columns));
+}
+
+Point::const_iterator ties_of(const Workload &workload, const Point &point) {
+  return point.begin() + static_cast<std::ptrdiff_t>(SettingSpace::kCaps + workload.dags.size());
 }
 
 // Formats the tie order of the point, a Lehmer code. Zeros stand for the order of the file.
 std::string ties_text(const Workload &workload, const Point &point) {
-  const auto first = point.begin() + 1 + static_cast<std::ptrdiff_t>(workload.dags.size());
+  const auto first = ties_of(workload, point);
   if (std::all_of(first, point.end(), [](std::uint32_t digit) { return digit == 0; })) return "as it is";
   return fmt::format("{}", fmt::join(first, point.end(), "."));
 }
 
 std::string scores_table(const Tuning &tuning, const StreamTraits &terminal) {
-  Table table({{"", false, 9},
-               {"seeds", false, 3},
-               {"proven", false, 5},
-               {"missed", true, 8},
-               {"lost", true, 2},
-               {"max lateness", true, 7},
-               {"least slack", true, 6}});
-  const auto add = [&](const char *title, const char *seeds, const RunScore &score) {
+  Table table = table_of({{"", false, 9}, {"judged by", false, 3}}, tuning);
+  const auto add = [&](const char *title, const char *seeds, const Score &score) {
     std::vector<Cell> cells = {{title}, {seeds}};
-    for (Cell &cell : score_cells(score, tuning.options.bounds)) cells.push_back(std::move(cell));
+    for (Cell &cell : score_cells(score)) cells.push_back(std::move(cell));
     table.add(std::move(cells));
   };
   const Tuned &tuned = tuning.tuned;
-  add("present", "searched", tuned.present.score);
-  if (tuned.found.point != tuned.present.point) add("found", "searched", tuned.found.score);
+  const char *judge = tuning.options.judge == Judge::Bounds ? "bounds" : "seeds";
+  add("present", judge, tuned.present.score);
+  if (tuned.found.point != tuned.present.point) add("found", judge, tuned.found.score);
   if (tuning.options.held_out > 0) {
-    add("present", "unseen", tuned.present.held_out);
-    if (tuned.found.point != tuned.present.point) add("found", "unseen", tuned.found.held_out);
+    add("present", "unseen seeds", tuned.present.held_out);
+    if (tuned.found.point != tuned.present.point) add("found", "unseen seeds", tuned.found.held_out);
   }
   return table.render(terminal.width, terminal.colour);
 }
 
-using Ranked = std::vector<std::pair<Point, RunScore>>;
+using Ranked = std::vector<std::pair<Point, Score>>;
 
 Ranked ranked(const Tuning &tuning) {
   Ranked trials(tuning.tuned.trials.begin(), tuning.tuned.trials.end());
   std::stable_sort(trials.begin(), trials.end(), [&](const auto &a, const auto &b) {
-    return lab::is_better(a.second, b.second, tuning.options.goal);
+    return lab::is_better(a.second, b.second, tuning.options.objective);
   });
   return trials;
 }
 
 std::string trials_table(const Tuning &tuning, const Ranked &trials, const StreamTraits &terminal) {
   const Workload &workload = tuning.tuned.present.workload;
-  Table table({{"workers", true, 8},
-               {.title = "max_active", .importance = 9, .prose = true},
-               {"tie order", false, 1},
-               {"proven", false, 5},
-               {"missed", true, 8},
-               {"lost", true, 2},
-               {"max lateness", true, 7},
-               {"least slack", true, 6}});
+  std::vector<Column> columns = {{"workers", true, 8}};
+  const bool has_orders = tuning.tuned.orders.size() > 1;
+  if (has_orders) columns.push_back({"priorities", false, 8});
+  columns.push_back({.title = "max_active", .importance = 9, .prose = true});
+  if (!has_orders) columns.push_back({"tie order", false, 1});
+  Table table = table_of(std::move(columns), tuning);
   for (const auto &[point, score] : trials) {
-    std::vector<Cell> cells = {{fmt::format("{}", point.front())},
-                               {caps_text(workload, std::span(point).subspan(1, workload.dags.size()))},
-                               {ties_text(workload, point)}};
-    for (Cell &cell : score_cells(score, tuning.options.bounds)) cells.push_back(std::move(cell));
+    std::vector<Cell> cells = {{fmt::format("{}", point.front())}};
+    if (has_orders) cells.push_back({tuning.tuned.orders[point[SettingSpace::kOrder]]});
+    cells.push_back({caps_text(workload, std::span(point).subspan(SettingSpace::kCaps, workload.dags.size()))});
+    if (!has_orders) cells.push_back({ties_text(workload, point)});
+    for (Cell &cell : score_cells(score)) cells.push_back(std::move(cell));
     table.add(std::move(cells));
   }
   return table.render(terminal.width, terminal.colour);
@@ -122,7 +149,7 @@ std::string trials_table(const Tuning &tuning, const Ranked &trials, const Strea
 std::string tried_tables(const Tuning &tuning, const StreamTraits &terminal, bool all) {
   const Ranked trials = ranked(tuning);
   if (trials.size() < 2) return {};
-  std::map<std::uint32_t, std::pair<Point, RunScore>> by_workers;
+  std::map<std::uint32_t, std::pair<Point, Score>> by_workers;
   for (const auto &trial : trials) by_workers.emplace(trial.first.front(), trial);
   std::string text;
   if (by_workers.size() > 1) {
@@ -152,12 +179,12 @@ struct Pairs {
 // Compares the two settings seed by seed; both had the same jobs.
 Pairs compare_runs(const Tuning &tuning) {
   Pairs pairs;
-  const std::vector<RunScore> &before = tuning.tuned.present.held_out_runs;
-  const std::vector<RunScore> &after = tuning.tuned.found.held_out_runs;
+  const std::vector<Score> &before = tuning.tuned.present.held_out_runs;
+  const std::vector<Score> &after = tuning.tuned.found.held_out_runs;
   for (std::size_t i = 0; i < std::min(before.size(), after.size()); ++i) {
-    if (lab::improves(after[i], before[i], tuning.options.goal)) {
+    if (lab::improves(after[i], before[i], tuning.options.objective)) {
       ++pairs.better;
-    } else if (lab::improves(before[i], after[i], tuning.options.goal)) {
+    } else if (lab::improves(before[i], after[i], tuning.options.objective)) {
       ++pairs.worse;
     } else {
       ++pairs.equal;
@@ -168,24 +195,17 @@ Pairs compare_runs(const Tuning &tuning) {
 
 std::string gains(const Tuning &tuning) {
   const Tuned &tuned = tuning.tuned;
-  const Objective objective = tuning.options.goal.objective;
+  const Objective objective = tuning.options.objective;
   const bool held = tuning.options.held_out > 0;
-  const RunScore &before = held ? tuned.present.held_out : tuned.present.score;
-  const RunScore &after = held ? tuned.found.held_out : tuned.found.score;
+  const Score &before = held ? tuned.present.held_out : tuned.present.score;
+  const Score &after = held ? tuned.found.held_out : tuned.found.score;
   std::string text;
   if (!before.proven && after.proven) text += "gain: the bounds now prove that every deadline is met\n";
-  text += fmt::format("{}, {}: {} -> {}\n", objective_name(objective),
-                      held ? "on unseen seeds" : "on the seeds of the search (no validation)",
-                      objective_text(before.all(), objective), objective_text(after.all(), objective));
-  if (has_classes(before)) {
-    for (const Criticality c : kByUrgency) {
-      const ClassScore &x = before.of[static_cast<std::size_t>(c)];
-      const ClassScore &y = after.of[static_cast<std::size_t>(c)];
-      if (x.released == 0) continue;
-      text += fmt::format("  criticality {}: {} -> {}\n", to_string(c), objective_text(x, objective),
-                          objective_text(y, objective));
-    }
-  }
+  text += fmt::format("{}, {}: {} -> {}\n", to_string(objective),
+                      tuning.options.judge == Judge::Bounds ? "by the bounds"
+                      : held                                ? "on unseen seeds"
+                                                            : "on the seeds of the search (no validation)",
+                      objective_text(before, tuning.options), objective_text(after, tuning.options));
   if (held) {
     const Pairs pairs = compare_runs(tuning);
     text += fmt::format("seed by seed: {} better, {} equal, {} worse\n", pairs.better, pairs.equal, pairs.worse);
@@ -193,47 +213,40 @@ std::string gains(const Tuning &tuning) {
   return text;
 }
 
-Json class_json(const ClassScore &score) {
-  return Json{{"released", score.released},
+Json counts_json(const Score &score) {
+  return Json{{"released", score.judged},
               {"missed", score.missed},
               {"lost", score.lost},
               {"max_lateness_ns", score.extremes.any ? Json(score.extremes.worst_lateness) : Json()},
               {"least_slack", score.extremes.any ? Json(score.extremes.least_slack) : Json()}};
 }
 
-Json score_json(const RunScore &score, bool bounds) {
-  Json json = class_json(score.all());
-  json["proven"] = bounds ? Json(score.proven) : Json();
-  json["criticality"] = Json::object();
-  for (const Criticality c : kByUrgency)
-    json["criticality"][to_string(c)] = class_json(score.of[static_cast<std::size_t>(c)]);
+Json score_json(const Score &score) {
+  Json json = counts_json(score);
+  json["proven"] = score.proven;
   return json;
 }
 
-Json setting_json(const Workload &workload, const Point &point) {
+Json setting_json(const Tuning &tuning, const Point &point) {
+  const Workload &workload = tuning.tuned.present.workload;
   Json caps = Json::object();
-  for (std::size_t d = 0; d < workload.dags.size(); ++d) caps[workload.dags[d].name] = point[1 + d];
+  for (std::size_t d = 0; d < workload.dags.size(); ++d) caps[workload.dags[d].name] = point[SettingSpace::kCaps + d];
   return Json{{"workers", point.front()},
+              {"priorities", tuning.tuned.orders[point[SettingSpace::kOrder]]},
               {"max_active", caps},
-              {"tie_order", std::vector<std::uint32_t>(
-                                point.begin() + 1 + static_cast<std::ptrdiff_t>(workload.dags.size()), point.end())}};
+              {"tie_order", std::vector<std::uint32_t>(ties_of(workload, point), point.end())}};
 }
 
 Json candidate_json(const SettingCandidate &candidate, const Tuning &tuning) {
-  const bool bounds = tuning.options.bounds;
-  Json json = setting_json(candidate.workload, candidate.point);
-  json["searched"] = score_json(candidate.score, bounds);
-  json["held_out"] = tuning.options.held_out > 0 ? score_json(candidate.held_out, bounds) : Json();
+  Json json = setting_json(tuning, candidate.point);
+  json["searched"] = score_json(candidate.score);
+  json["held_out"] = tuning.options.held_out > 0 ? score_json(candidate.held_out) : Json();
   json["held_out_runs"] = Json::array();
-  for (const RunScore &run : candidate.held_out_runs) json["held_out_runs"].push_back(class_json(run.all()));
+  for (const Score &run : candidate.held_out_runs) json["held_out_runs"].push_back(counts_json(run));
   return json;
 }
 
 }  // namespace
-
-const char *objective_name(Objective objective) {
-  return objective == Objective::Lateness ? "max_lateness" : to_string(objective);
-}
 
 std::vector<std::string> changes(const Tuned &tuned) {
   std::vector<std::string> list;
@@ -249,11 +262,13 @@ std::string in_words(const Tuning &tuning) {
     text += gains(tuning);
   } else if (tuned.rejected()) {
     text += "nothing to change: the best setting of the search is worse on the unseen seeds\n" + gains(tuning);
+  } else if (tuning.options.judge == Judge::Bounds && !tuned.present.score.extremes.any) {
+    text += "nothing to compare: no method bounds any response time, whatever was tried; see 'redag analyze'\n";
   } else {
     text += fmt::format("nothing to change: no other setting that was tried is better by {}\n",
-                        objective_name(tuning.options.goal.objective));
+                        to_string(tuning.options.objective));
   }
-  if (!tuned.varies) {
+  if (!tuned.varies && tuning.options.judge == Judge::Simulation) {
     text +=
         "runs with different seeds are equal, because execution times and jitter do not vary: no validation is "
         "needed\n";
@@ -269,17 +284,18 @@ std::string in_words(const Tuning &tuning) {
 std::string describe(const Tuning &tuning, const StreamTraits &terminal, bool all) {
   const Workload &workload = tuning.tuned.present.workload;
   const lab::TuneOptions &options = tuning.options;
-  std::string text = fmt::format("{}: {}, {} worker{}; objective: {}{}\n", workload.name, to_string(workload.policy),
-                                 workload.platform.workers, workload.platform.workers == 1 ? "" : "s",
-                                 objective_name(options.goal.objective),
-                                 options.goal.per_criticality ? ", the most critical DAGs first" : "");
-  text += fmt::format(
-      "simulated {} with {}; validated on {} unseen seed{}; {}\n"
-      "\n",
-      humanize_duration(options.simulation.duration),
-      options.seeds == 1 ? std::string("one seed") : fmt::format("each of {} seeds", options.seeds), options.held_out,
-      options.held_out == 1 ? "" : "s",
-      options.bounds ? "settings that the bounds prove come first" : "bounds are not used");
+  std::string text =
+      fmt::format("{}: {}, {} worker{}; objective: {}\n", workload.name, to_string(workload.policy),
+                  workload.platform.workers, workload.platform.workers == 1 ? "" : "s", to_string(options.objective));
+  if (options.judge == Judge::Bounds) {
+    text += "judged by the bounds, which hold for every execution\n\n";
+  } else {
+    text += fmt::format(
+        "simulated {} with {}; validated on {} unseen seed{}; settings that the bounds prove come first\n\n",
+        humanize_duration(options.simulation.duration),
+        options.seeds == 1 ? std::string("one seed") : fmt::format("each of {} seeds", options.seeds), options.held_out,
+        options.held_out == 1 ? "" : "s");
+  }
   text += scores_table(tuning, terminal);
   text += tried_tables(tuning, terminal, all) + "\n";
   for (const std::string &change : changes(tuning.tuned)) {
@@ -293,14 +309,14 @@ Json to_json(const Tuning &tuning) {
   const lab::TuneOptions &options = tuning.options;
   Json trials = Json::array();
   for (const auto &[point, score] : tuned.trials) {
-    Json row = setting_json(tuned.present.workload, point);
-    row.update(score_json(score, options.bounds));
+    Json row = setting_json(tuning, point);
+    row.update(score_json(score));
     trials.push_back(std::move(row));
   }
-  return Json{{"format", "redag.tuning/1"},
+  return Json{{"format", "redag.tuning/2"},
               {"workload", tuned.present.workload.name},
-              {"objective", objective_name(options.goal.objective)},
-              {"per_criticality", options.goal.per_criticality},
+              {"judge", to_string(options.judge)},
+              {"objective", to_string(options.objective)},
               {"duration_ns", options.simulation.duration},
               {"seed", options.seed},
               {"seeds", options.seeds},

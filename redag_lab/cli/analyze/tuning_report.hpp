@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Presents the result of `tune`: the changes, their gain on unseen seeds, and the alternatives tried. Pure functions.
+// Presents the result of `tune`: the changes, their gain, and the alternatives tried. Pure functions.
 #pragma once
 
 #include <string>
@@ -18,9 +18,6 @@ struct Tuning {
   lab::TuneOptions options;
 };
 
-/// Returns the objective as `tune` names it: "misses", "max_lateness" or "slack".
-[[nodiscard]] const char *objective_name(lab::Objective objective);
-
 /// Returns one line per change: "max_active of nav: none -> 2". Empty if no setting is better.
 [[nodiscard]] std::vector<std::string> changes(const lab::Tuned &tuned);
 
@@ -30,7 +27,7 @@ struct Tuning {
 /// `all`: every combination tried.
 [[nodiscard]] std::string describe(const Tuning &tuning, const StreamTraits &terminal, bool all);
 
-/// Returns `redag.tuning/1`.
+/// Returns `redag.tuning/2`.
 [[nodiscard]] Json to_json(const Tuning &tuning);
 
 }  // namespace redag::cli

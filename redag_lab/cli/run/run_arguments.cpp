@@ -203,7 +203,7 @@ std::string_view without_provenance(std::string_view text) {
 
 bool write_changed(const std::string &path, const std::string &source, const Workload &workload, Console &console) {
   if (path.empty()) return true;
-  const std::string changed = edit_yaml(source, workload, {.cluster_optional = true, .waits = true});
+  const std::string changed = edit_yaml(source, workload, {.waits = true});
   const bool is_unchanged = changed == source;
   const Result<void> written = write_text(
       path,

@@ -27,7 +27,6 @@ Action add_calibrate(CLI::App &app);
 Action add_compare(CLI::App &app);
 Action add_analyze(CLI::App &app);
 Action add_sensitivity(CLI::App &app);
-Action add_assign(CLI::App &app);
 Action add_tune(CLI::App &app);
 Action add_experiment(CLI::App &app);
 Action add_check_trace(CLI::App &app);

@@ -51,8 +51,6 @@ struct Range {
 
 /// Limits where only the machine sets one: threads, combinations, restarts, recorded events.
 inline constexpr std::uint32_t kMaxJobs = 1024;
-inline constexpr std::uint32_t kMaxRestarts = 1'000'000;
-inline constexpr std::uint64_t kMaxCombinations = 1'000'000'000;
 inline constexpr std::uint64_t kMaxEvents = 1'000'000'000;
 
 /// Returns the option of `app` with this `name` ("--out"), which must exist. CLI::App::get_option() ends the process

@@ -67,13 +67,10 @@ constexpr std::array kCommands = {
           "  redag sensitivity workloads/robot.yaml\n"
           "  redag sensitivity workloads/robot.yaml --preemption none --task lidar\n"
           "  redag sensitivity workloads/robot.yaml --simulate --json\n"},
-    Entry{"assign", "Choose priorities, max_active or clusters by response-time analysis", add_assign,
-          "  redag assign workloads/robot.yaml\n"
-          "  redag assign workloads/robot.yaml --objective slack -o tuned.yaml\n"
-          "  redag assign workloads/robot.yaml --keep priorities --workers 4 --json\n"},
-    Entry{"tune", "Find better max_active, workers and tie order by simulation", add_tune,
+    Entry{"tune", "Find better priorities, max_active, workers and tie order", add_tune,
           "  redag tune workloads/robot.yaml\n"
-          "  redag tune workloads/robot.yaml --objective max_lateness -o tuned.yaml\n"
+          "  redag tune workloads/robot.yaml --judge bounds -o tuned.yaml\n"
+          "  redag tune workloads/robot.yaml --judge bounds --workers 4 --json\n"
           "  redag tune workloads/robot.yaml --vary max_active --caps 2-5 --all-trials\n"},
     Entry{"experiment", "Run experiments over many workloads: seeded, parallel, resumable", add_experiment,
           "  redag experiment acceptance experiments/acceptance_tasks.yaml\n"

@@ -1,14 +1,13 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_lab/cli/analyze/assignment_report.hpp"
+#include "redag_lab/cli/analyze/sensitivity_report.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <map>
 
-#include "redag_lab/cli/analyze/sensitivity_report.hpp"
 #include "redag_testing/builders.hpp"
 
 namespace redag::cli {
@@ -18,40 +17,6 @@ Workload short_deadline() {
   return testing::make_workload({testing::make_dag("a", {{"t", 10, 3}}),
                                  testing::make_dag("b", {{.name = "t", .period = 20, .wcet = 2, .deadline = 4}})},
                                 1, PreemptionMode::Os);
-}
-
-Assigned assigned(const Workload &workload) {
-  Assigned result;
-  result.platform = analysis::platform_of(workload);
-  result.assignment = lab::assign(workload, result.platform).value();
-  return result;
-}
-
-TEST(AssignmentReport, TellsChangesAndGains) {
-  const Assigned result = assigned(short_deadline());
-  EXPECT_EQ(changes(result.assignment), std::vector<std::string>{"policy: rate_monotonic -> deadline_monotonic"});
-  const std::string words = in_words(result);
-  EXPECT_NE(words.find("worst lateness (bound - deadline): 1ms -> -2ms\n"), std::string::npos) << words;
-  EXPECT_NE(words.find("least slack (share of a deadline): -25.0 % -> 50.0 %\n"), std::string::npos) << words;
-  const Json document = to_json(result);
-  EXPECT_EQ(document["best"]["worst_lateness_ns"], -2 * kMillisecond);
-  EXPECT_EQ(document["present"]["schedulable"], false);
-}
-
-TEST(AssignmentReport, PrioritiesAreListedTaskByTask) {
-  Workload workload = short_deadline();
-  workload.policy = PolicyKind::Fixed;
-  workload.dags[0].tasks[0].priority = 7;
-  const Assigned result = assigned(workload);
-  const std::vector<std::string> expected = {"policy: fixed -> deadline_monotonic", "priority of a.t: 7 -> none"};
-  EXPECT_EQ(changes(result.assignment), expected);
-}
-
-TEST(AssignmentReport, WithoutBoundsThereIsNothingToCompare) {
-  Workload workload = short_deadline();
-  workload.dags[0].tasks[0].budget = kMillisecond;
-  const std::string words = in_words(assigned(workload));
-  EXPECT_EQ(words.find("nothing to compare: "), 0U) << words;
 }
 
 TEST(SensitivityReport, FactorsAreNeverRoundedUp) {

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_lab/search/assignment.hpp"
+#include "redag_lab/search/audsley.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,6 @@
 #include <limits>
 #include <numeric>
 
-#include "redag/model/workload_yaml.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
 #include "redag_testing/bound_property.hpp"
 #include "redag_testing/builders.hpp"
@@ -21,134 +20,6 @@ namespace {
 using testing::BoundCase;
 using testing::BoundCaseLimits;
 using testing::independent;
-using testing::tick_dag;
-
-Assignment assigned(const Workload &workload, const AssignmentOptions &options = {}) {
-  return assign(workload, analysis::platform_of(workload), options).value();
-}
-
-TEST(Assignment, ShortDeadlinesGoFirst) {
-  // By rate, b waits for a and responds after 5. By deadline, it responds after 2.
-  const Assignment result = assigned(independent({{3, 10}, {2, 20, 4}}));
-  EXPECT_FALSE(result.present.score.schedulable);
-  EXPECT_EQ(result.present.score.extremes.worst_lateness, 1);
-  EXPECT_TRUE(result.best.score.schedulable);
-  EXPECT_EQ(result.best.order, "deadline_monotonic");
-  EXPECT_EQ(result.best.score.extremes.worst_lateness, -2);
-  EXPECT_EQ(result.best.workload.policy, PolicyKind::DeadlineMonotonic);
-}
-
-TEST(Assignment, AudsleyBeatsDeadlinesLongerThanPeriods) {
-  // From J. Lehoczky, RTSS 1990: with D > T, neither rates nor deadlines decide. With (52, 100, D = 110) above (52,
-  // 140, D = 154), the second responds after 156. In the other order the responses are 108 and 52.
-  Workload workload = independent({{52, 100, 110}, {52, 140, 154}});
-  for (Dag &dag : workload.dags) {
-    dag.tasks[0].overrun = Overrun::Queue;
-    dag.tasks[0].queue_depth = 2;
-  }
-  const Assignment result = assigned(workload);
-  EXPECT_FALSE(result.present.score.schedulable);
-  EXPECT_TRUE(result.audsley_optimal);
-  EXPECT_TRUE(result.audsley_found);
-  EXPECT_EQ(result.best.order, "audsley");
-  EXPECT_TRUE(result.best.score.schedulable);
-  EXPECT_EQ(result.best.units, (UnitOrder{1, 0}));
-  EXPECT_EQ(result.best.score.extremes.worst_lateness, -2);
-  EXPECT_EQ(result.best.workload.policy, PolicyKind::Fixed);
-  EXPECT_GT(result.best.workload.dags[1].tasks[0].priority, result.best.workload.dags[0].tasks[0].priority);
-}
-
-TEST(Assignment, LeavesAloneWhatNothingImproves) {
-  const Workload workload = independent({{1, 4}, {1, 8}});
-  for (const Objective objective : {Objective::Lateness, Objective::Slack}) {
-    AssignmentOptions options;
-    options.objective = objective;
-    const Assignment result = assigned(workload, options);
-    EXPECT_EQ(result.best.order, "present");
-    EXPECT_EQ(result.best.workload, workload);
-  }
-}
-
-TEST(Assignment, ObjectivesDiffer) {
-  // With (2, 6) above (2, 20): R = 2 and 4, lateness -4 and -16, slack 4/6 and 16/20. In the other order R = 4 and 2,
-  // and the largest lateness is -2.
-  const BoundScore high{true, 0, {-4, 0.6, true}, 10};
-  const BoundScore low{true, 0, {-2, 0.9, true}, 9};
-  EXPECT_TRUE(is_better(high, low, Objective::Lateness));
-  EXPECT_TRUE(is_better(low, high, Objective::Slack));
-  EXPECT_TRUE(
-      is_better(BoundScore{true, 0, {5, 0, true}, 0}, BoundScore{false, 0, {-5, 1, true}, 0}, Objective::Lateness));
-  EXPECT_TRUE(
-      is_better(BoundScore{false, 1, {5, 0, true}, 0}, BoundScore{false, 2, {-5, 1, true}, 0}, Objective::Lateness));
-  BoundScore smaller = high;
-  smaller.total = 9;
-  EXPECT_TRUE(is_better(smaller, high, Objective::Lateness));
-  EXPECT_FALSE(improves(smaller, high, Objective::Lateness));
-}
-
-TEST(Assignment, ABoundOfActiveJobsIsolatesADag) {
-  // On 3 workers, without preemption, "wide" can fill all workers and block "quick" for 40. With at most 2 active jobs
-  // of "wide", "quick" always finds a worker.
-  const std::vector<testing::TestTask> wide = {
-      {"source", 400, 40}, {"a", 0, 40, {0}}, {"b", 0, 40, {0}}, {"c", 0, 40, {0}}, {"d", 0, 40, {0}}};
-  const Workload workload = testing::make_workload({tick_dag("quick", {{"t", 20, 2}}), tick_dag("wide", wide)}, 3);
-  const Assignment result = assigned(workload);
-  EXPECT_FALSE(result.present.score.schedulable);
-  EXPECT_TRUE(result.best.score.schedulable);
-  EXPECT_EQ(result.best.caps[0], 0U);
-  EXPECT_EQ(result.best.caps[1], 2U);
-  EXPECT_TRUE(result.exhaustive);
-  EXPECT_EQ(result.trials.size(), 4U);  // none, 1, 2, 3 for "wide"
-  AssignmentOptions keep;
-  keep.caps = false;
-  EXPECT_EQ(assigned(workload, keep).best.caps, (Caps{0, 0}));
-}
-
-TEST(Assignment, LocalSearchIsDeterministicAndNoBetterThanAll) {
-  int compared = 0;
-  for (int i = 0; i < 40; ++i) {
-    Rng rng(mix(static_cast<std::uint64_t>(i) + 5));
-    BoundCaseLimits limits;
-    limits.min_workers = limits.max_workers = 3;
-    limits.edges = limits.caps = true;
-    limits.max_dags = 3;
-    limits.max_utilization = 0.7;
-    limits.preemption = i % 2 == 0 ? sched::Preemption::Full : sched::Preemption::None;
-    const BoundCase bound_case = testing::random_bound_case(rng, limits);
-    AssignmentOptions all;
-    all.priorities = false;
-    AssignmentOptions local = all;
-    local.exhaustive = 0;
-    const auto a = assign(bound_case.workload, bound_case.platform, all);
-    const auto b = assign(bound_case.workload, bound_case.platform, local);
-    const auto c = assign(bound_case.workload, bound_case.platform, local);
-    ASSERT_TRUE(a && b && c);
-    EXPECT_TRUE(a->exhaustive);
-    EXPECT_FALSE(b->exhaustive);
-    EXPECT_EQ(b->best.workload, c->best.workload);
-    EXPECT_FALSE(is_better(b->best.score, a->best.score, Objective::Lateness));
-    EXPECT_FALSE(is_better(a->present.score, b->best.score, Objective::Lateness));
-    compared += improves(a->best.score, a->present.score, Objective::Lateness) ? 1 : 0;
-  }
-  EXPECT_GT(compared, 0);
-}
-
-TEST(Assignment, StopsWithTheBestSoFar) {
-  AssignmentOptions options;
-  int asked = 0;
-  options.stop = [&] { return ++asked > 1; };
-  const Workload workload = independent({{3, 10}, {2, 20, 4}});
-  const Assignment result = assigned(workload, options);
-  EXPECT_TRUE(result.stopped);
-  EXPECT_EQ(result.best.workload, workload);
-}
-
-TEST(Assignment, OfEdfChangesNoOrderThatWorks) {
-  const Workload workload = independent({{3, 10}, {2, 20, 4}}, 1, PolicyKind::Edf);
-  const Assignment result = assigned(workload);
-  EXPECT_TRUE(result.present.score.schedulable);
-  EXPECT_EQ(result.best.workload, workload);
-}
 
 // Every unit's response under the order-free test fits its deadline, and the largest lateness.
 struct UnderTest {
@@ -344,46 +215,6 @@ TEST(AudsleyProperty, SeveralWorkersDags) {
   limits.min_deadline = 0.8;
   limits.max_utilization = 0.8;
   expect_optimal(limits);
-}
-
-TEST(AssignmentProperty, NeverWorseAndWhatIsWrittenMeansTheSame) {
-  const auto cases = static_cast<int>(testing::how_many(150));
-  int better = 0;
-  for (int i = 0; i < cases; ++i) {
-    Rng rng(mix(static_cast<std::uint64_t>(i) + 901));
-    BoundCaseLimits limits;
-    limits.max_workers = 3;
-    limits.edges = i % 2 == 0;
-    limits.caps = true;
-    limits.max_dags = 4;
-    limits.preemption = i % 3 == 0 ? sched::Preemption::None : sched::Preemption::Full;
-    limits.policies = {PolicyKind::RateMonotonic, PolicyKind::Fixed, PolicyKind::ChainAware, PolicyKind::Edf};
-    const BoundCase bound_case = testing::random_bound_case(rng, limits);
-    SCOPED_TRACE(describe(bound_case));
-    for (const Objective objective : {Objective::Lateness, Objective::Slack}) {
-      AssignmentOptions options;
-      options.objective = objective;
-      const auto result = assign(bound_case.workload, bound_case.platform, options);
-      ASSERT_TRUE(result);
-      ASSERT_FALSE(is_better(result->present.score, result->best.score, objective) &&
-                   improves(result->present.score, result->best.score, objective));
-      better += improves(result->best.score, result->present.score, objective) ? 1 : 0;
-      // Written to YAML and read again, the workload has the same score. Only order and caps have changed.
-      const auto read = parse_workload(to_yaml(result->best.workload), "w.yaml");
-      ASSERT_TRUE(read) << to_string(read.error());
-      ASSERT_EQ(score_of(analysis::compile(read->workload, bound_case.platform).value()), result->best.score);
-      Workload undone = result->best.workload;
-      undone.policy = bound_case.workload.policy;
-      for (std::size_t d = 0; d < undone.dags.size(); ++d) {
-        undone.dags[d].max_active = bound_case.workload.dags[d].max_active;
-        for (std::size_t t = 0; t < undone.dags[d].tasks.size(); ++t) {
-          undone.dags[d].tasks[t].priority = bound_case.workload.dags[d].tasks[t].priority;
-        }
-      }
-      ASSERT_EQ(undone, bound_case.workload);
-    }
-  }
-  EXPECT_GT(better, 0);
 }
 
 }  // namespace
