@@ -92,7 +92,6 @@ class Generator {
       draw_demands(workload_.dags[d], std::span<const double>(*utilizations).subspan(next));
       next += workload_.dags[d].tasks.size();
     }
-    if (o_.clusters > 0) place_in_clusters();
     REDAG_CHECK(!has_errors(validate(workload_)), "a generated workload is valid");
     return std::move(workload_);
   }
@@ -216,14 +215,8 @@ class Generator {
   void draw_options(Dag &dag) {
     Rng rng = stream(Stream::Options);
     dag.max_active = uniform(o_.max_active_min, o_.max_active_max, rng);
-    const double level = rng.uniform01();
-    if (level < o_.high_share) {
-      dag.criticality = Criticality::High;
-    } else if (level < o_.high_share + o_.low_share) {
-      dag.criticality = Criticality::Low;
-    }
+    rng.uniform01();  // not used; a draw less would change the workloads of every seed
     for (Task &task : dag.tasks) {
-      task.criticality = dag.criticality;
       if (rng.uniform01() < o_.group_share) task.group = fmt::format("g{}", rng.uniform(0, o_.groups - 1));
       if (rng.uniform01() < o_.queue_share) {
         task.overrun = Overrun::Queue;
@@ -261,25 +254,6 @@ class Generator {
     }
   }
 
-  // One DAG after the other goes where the utilization per worker is lowest. An exclusive group is one of its cluster.
-  void place_in_clusters() {
-    std::vector<Cluster> &clusters = workload_.platform.clusters;
-    for (std::uint32_t c = 0; c < o_.clusters; ++c) {
-      clusters.push_back(
-          {fmt::format("cluster{}", c), o_.workers / o_.clusters + (c < o_.workers % o_.clusters ? 1U : 0U)});
-    }
-    std::vector<double> loads(clusters.size());
-    for (Dag &dag : workload_.dags) {
-      const auto load = std::min_element(loads.begin(), loads.end());
-      const Cluster &cluster = clusters[static_cast<std::size_t>(load - loads.begin())];
-      dag.cluster = cluster.name;
-      *load += dag.utilization() / cluster.workers;
-      for (Task &task : dag.tasks) {
-        if (!task.group.empty()) task.group = fmt::format("{}_{}", cluster.name, task.group);
-      }
-    }
-  }
-
   const GenerateOptions &o_;
   std::uint64_t seed_;
   std::uint32_t dag_ = 0;
@@ -302,8 +276,6 @@ Diagnostics find_mistakes(const GenerateOptions &o) {
   require(std::uint64_t{o.dags} * o.max_tasks <= kMaxTasks,
           fmt::format("dags * max_tasks must be at most {}", kMaxTasks));
   require(o.workers >= 1 && o.workers <= kMaxWorkers, fmt::format("workers must be from 1 to {}", kMaxWorkers));
-  require(o.clusters <= o.workers, fmt::format("clusters must be at most workers ({}), not {}", o.workers, o.clusters));
-  require(o.clusters <= kMaxClusters, fmt::format("clusters must be at most {}", kMaxClusters));
   require(o.preemption != PreemptionMode::Os || is_static(o.policy), "preemption 'os' needs a static policy");
   require(o.utilization > 0 && std::isfinite(o.utilization), "utilization must be greater than zero");
   require(o.max_task_utilization > 0 && o.max_task_utilization <= 1, "max_task_utilization must be in (0, 1]");
@@ -324,9 +296,6 @@ Diagnostics find_mistakes(const GenerateOptions &o) {
   require_share("jitter", o.jitter);
   require_share("group_share", o.group_share);
   require_share("queue_share", o.queue_share);
-  require_share("high_share", o.high_share);
-  require_share("low_share", o.low_share);
-  require(o.high_share + o.low_share <= 1 + 1e-9, "high_share and low_share together must be at most 1");
   return mistakes;
 }
 

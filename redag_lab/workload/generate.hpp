@@ -55,7 +55,6 @@ struct GenerateOptions {
   std::uint32_t min_tasks = 3;  // per DAG
   std::uint32_t max_tasks = 8;
   std::uint32_t workers = 2;
-  std::uint32_t clusters = 0;  // that share the workers evenly; 0: all workers serve all DAGs
   PreemptionMode preemption = PreemptionMode::Auto;
   PolicyKind policy = PolicyKind::RateMonotonic;
 
@@ -85,8 +84,6 @@ struct GenerateOptions {
   double group_share = 0.0;  // of the tasks that belong to one of the groups
   double queue_share = 0.0;  // of the tasks with overrun queue, of depth 1 to queue_depth
   std::uint32_t queue_depth = 3;
-  double high_share = 0.0;  // of the DAGs with criticality high
-  double low_share = 0.0;   // of the DAGs with criticality low
 };
 
 /// Returns the mistakes in the options, each with a message. This is cheap, unlike generate() with large options.

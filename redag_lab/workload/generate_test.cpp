@@ -11,7 +11,6 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include "redag/model/clusters.hpp"
 #include "redag/model/validate.hpp"
 #include "redag_lab/workload/generate_utilization.hpp"
 
@@ -24,7 +23,6 @@ GenerateOptions arbitrary_options() {
   o.min_tasks = *rc::gen::inRange(1U, 8U);
   o.max_tasks = o.min_tasks + *rc::gen::inRange(0U, 8U);
   o.workers = *rc::gen::inRange(1U, 9U);
-  o.clusters = *rc::gen::inRange(0U, o.workers + 1);
   o.max_task_utilization = *rc::gen::element(0.3, 0.7, 1.0);
   const double most = o.max_task_utilization * o.dags * o.min_tasks;
   o.utilization = most * (*rc::gen::inRange(1, 101)) / 100.0;
@@ -43,8 +41,6 @@ GenerateOptions arbitrary_options() {
   o.groups = 2;
   o.group_share = 0.3;
   o.queue_share = 0.5;
-  o.high_share = 0.2;
-  o.low_share = 0.2;
   return o;
 }
 
@@ -146,32 +142,8 @@ TEST(Generate, ShapesAreWhatTheirNamesSay) {
   EXPECT_GT(edges(layered), 0U);
 }
 
-TEST(Generate, ClustersShareWorkersAndLoad) {
-  GenerateOptions options;
-  options.dags = 40;
-  options.workers = 8;
-  options.clusters = 3;
-  options.utilization = 6;
-  options.groups = 2;
-  options.group_share = 0.5;
-  const Workload workload = generate(options, 1).value();
-  std::vector<std::uint32_t> workers;
-  for (const Cluster &cluster : workload.platform.clusters) workers.push_back(cluster.workers);
-  EXPECT_EQ(workers, (std::vector<std::uint32_t>{3, 3, 2}));
-  for (const ClusterPart &part : parts_of(workload)) {
-    EXPECT_NEAR(part.workload.utilization() / part.workload.platform.workers, 6.0 / 8, 0.1) << part.name;
-  }
-
-  // Without clusters everything else is as before.
-  options.clusters = 0;
-  const Workload whole = generate(options, 1).value();
-  EXPECT_TRUE(whole.platform.clusters.empty());
-  EXPECT_EQ(whole.dags[7].tasks[0].wcet, workload.dags[7].tasks[0].wcet);
-}
-
 TEST(Generate, RefusesOptionsWithAllReasons) {
   GenerateOptions options;
-  options.clusters = 3;
   options.dags = 0;
   options.jitter = 2;
   options.period_min = 0;
@@ -179,7 +151,6 @@ TEST(Generate, RefusesOptionsWithAllReasons) {
   ASSERT_FALSE(refused);
   const std::string found = to_string(refused.error());
   EXPECT_NE(found.find("dags must be at least 1"), std::string::npos) << found;
-  EXPECT_NE(found.find("clusters must be at most workers (2), not 3"), std::string::npos) << found;
   EXPECT_NE(found.find("jitter must be from 0 to 1, not 2"), std::string::npos) << found;
   EXPECT_NE(found.find("period_min is below period_granularity"), std::string::npos) << found;
 }

@@ -372,7 +372,7 @@ class Factorial(Case):
         self.write("cart.yaml", CART.replace("25ms", "25"))
         result = self.expect(redag("experiment", "factorial", self.plan()), 2, "plan.yaml:5:13: error: the workload")
         self.assertIn("cart.yaml:7:", result.stderr)
-        self.write("cart.yaml", redag("generate", "--clusters", "2").stdout)
+        self.write("cart.yaml", (SOURCE / "workloads" / "clusters.yaml").read_text())
         self.expect(redag("experiment", "factorial", self.plan()), 2, "an experiment")
         self.expect(redag("experiment", "factorial"), 2, "PLAN")
         self.expect(redag("experiment", "factorial", "/no/such.yaml"), 2, "/no/such.yaml")

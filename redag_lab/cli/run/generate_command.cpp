@@ -26,7 +26,6 @@ struct GenerateOptions {
 };
 
 constexpr std::uint32_t kMaxCount = 1'000'000;
-constexpr Range<double> kShare = {0, 1};
 constexpr double kLeastShare = 1e-9;  // minimum of options that must be above 0
 
 void add_structure(CLI::App &app, lab::GenerateOptions &g) {
@@ -37,57 +36,23 @@ void add_structure(CLI::App &app, lab::GenerateOptions &g) {
   add_choice(app, "--shape", g.shape, choices_of(lab::kDagShapes), "Structure of the edges")
       ->default_str(to_string(g.shape))
       ->group(group);
-  add_number(app, "--edge-probability", g.edge_probability, kShare,
-             "Probability of each further edge (layered, erdos_renyi)")
-      ->group(group);
-  add_number(app, "--data-share", g.data_share, kShare,
-             "Share of the tasks with predecessors that are released by data")
-      ->group(group);
-  add_count(app, "--max-active-min", g.max_active_min, {0, kMaxBound}, "Smallest max_active of a DAG; 0: no bound")
-      ->group(group);
-  add_count(app, "--max-active-max", g.max_active_max, {0, kMaxBound}, "Largest max_active of a DAG; 0: no bound")
-      ->group(group);
-  add_count(app, "--groups", g.groups, {0, lab::kMaxTasks}, "Number of exclusive groups in the workload")->group(group);
-  add_number(app, "--group-share", g.group_share, kShare, "Share of the tasks that are in a group")->group(group);
-  add_number(app, "--queue-share", g.queue_share, kShare, "Share of the tasks with 'overrun: queue'")->group(group);
-  add_count(app, "--queue-depth", g.queue_depth, {1, kMaxQueueDepth}, "Largest queue_depth of these tasks")
-      ->group(group);
-  add_number(app, "--high-share", g.high_share, kShare, "Share of the DAGs with 'criticality: high'")->group(group);
-  add_number(app, "--low-share", g.low_share, kShare, "Share of the DAGs with 'criticality: low'")->group(group);
 }
 
 void add_timing(CLI::App &app, lab::GenerateOptions &g) {
   const std::string group = "Time";
   add_number(app, "--utilization", g.utilization, {kLeastShare, lab::kMaxTasks}, "Total utilization of all tasks")
       ->group(group);
-  add_number(app, "--max-task-utilization", g.max_task_utilization, {kLeastShare, 1}, "Largest utilization of one task")
-      ->group(group);
-  add_choice(app, "--method", g.method, choices_of(lab::kUtilizationMethods),
-             "How the utilization is divided among tasks")
-      ->default_str(to_string(g.method))
-      ->group(group);
   add_choice(app, "--periods", g.periods, choices_of(lab::kPeriodModels), "Distribution of periods")
       ->default_str(to_string(g.periods))
       ->group(group);
   add_duration(app, "--period-min", g.period_min, "Shortest period (log_uniform, harmonic)")->group(group);
   add_duration(app, "--period-max", g.period_max, "Longest period (log_uniform, harmonic)")->group(group);
-  add_duration(app, "--period-granularity", g.period_granularity, "Unit of which periods are multiples (log_uniform)")
-      ->group(group);
-  add_choice(app, "--rates", g.rates, choices_of(lab::kRateScopes), "Whether each DAG or each task draws a period")
-      ->default_str(to_string(g.rates))
-      ->group(group);
-  add_number(app, "--deadline-min", g.deadline_min, {kLeastShare, 4}, "Smallest deadline / period")->group(group);
-  add_number(app, "--deadline-max", g.deadline_max, {kLeastShare, 4}, "Largest deadline / period")->group(group);
-  add_number(app, "--bcet-min", g.bcet_min, kShare, "Smallest bcet / wcet")->group(group);
-  add_number(app, "--bcet-max", g.bcet_max, kShare, "Largest bcet / wcet")->group(group);
-  add_number(app, "--jitter", g.jitter, kShare, "Release jitter / period of timer tasks")->group(group);
   app.add_flag("--offsets", g.offsets, "Give timer tasks random offsets below their periods")->group(group);
 }
 
 void add_platform(CLI::App &app, lab::GenerateOptions &g) {
   const std::string group = "Platform";
   add_count(app, "--workers", g.workers, {1, kMaxWorkers}, "Number of workers")->group(group);
-  add_count(app, "--clusters", g.clusters, {0, kMaxClusters}, "Clusters that share the workers; 0: none")->group(group);
   add_choice(app, "--preemption", g.preemption, preemption_choices(), "Preemption mode")
       ->default_str(to_string(g.preemption))
       ->group(group);
