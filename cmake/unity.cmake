@@ -21,7 +21,6 @@ set(alone
   redag_analysis/metrics/trace_checker_test.cpp
   redag_analysis/metrics/why_test.cpp
   redag_analysis/one_worker/edf_demand_test.cpp
-  redag_analysis/one_worker/exact_points_test.cpp
   redag_analysis/one_worker/paper_test.cpp
   redag_analysis/one_worker/response_time_test.cpp
   redag_analysis/one_worker/utilization_test.cpp

@@ -8,8 +8,6 @@
 
 #include "redag_analysis/analyze/analyze.hpp"
 #include "redag_analysis/one_worker/edf_demand.hpp"
-#include "redag_analysis/one_worker/exact_points.hpp"
-#include "redag_analysis/one_worker/linear_bound.hpp"
 #include "redag_analysis/one_worker/paper.hpp"
 #include "redag_analysis/one_worker/response_time.hpp"
 #include "redag_analysis/one_worker/utilization.hpp"
@@ -62,10 +60,7 @@ TEST(Examples, BurnsWellings) {
 TEST(Examples, LehoczkyShaDing) {
   const std::vector<Load> tasks = {{40, 100}, {40, 150}, {100, 350}};
   EXPECT_EQ(responses(rta_preemptive(), tasks, kFull), (Durations{40, 80, 300}));
-  const TaskSet task_set = compiled(in_one_dag(tasks), kFull);
-  EXPECT_TRUE(accepts(exact_points(), task_set));
-  EXPECT_FALSE(accepts(liu_layland(), task_set));
-  EXPECT_FALSE(accepts(hyperbolic(), task_set));
+  EXPECT_FALSE(accepts(hyperbolic_blocking(), compiled(in_one_dag(tasks), kFull)));
 }
 
 // J. Lehoczky, RTSS 1990: with deadlines above the period the first job is not the worst: 114, 102, 116, 104, 118, ...
@@ -101,16 +96,13 @@ TEST(Examples, DavisBurnsBrilLukkien) {
 TEST(Examples, HyperbolicBeyondLiuLayland) {
   const TaskSet task_set = compiled(in_one_dag({{50, 100}, {43, 130}}), kFull);
   EXPECT_GT(task_set.utilization, 0.8285);
-  EXPECT_FALSE(accepts(liu_layland(), task_set));
-  EXPECT_TRUE(accepts(hyperbolic(), task_set));
+  EXPECT_TRUE(accepts(hyperbolic_blocking(), task_set));
 }
 
 TEST(Examples, HarmonicPeriodsFillTheProcessor) {
-  const TaskSet full = compiled(in_one_dag({{1, 3}, {1, 6}, {6, 12}}), kFull);
-  EXPECT_TRUE(accepts(harmonic_chains(), full)) << "U = 1 exactly, in thirds";
-  EXPECT_FALSE(accepts(hyperbolic(), full));
-  const TaskSet above = compiled(in_one_dag({{1, 3}, {1, 6}, {7, 12}}), kFull);
-  EXPECT_FALSE(accepts(harmonic_chains(), above));
+  const std::vector<Load> full = {{1, 3}, {1, 6}, {6, 12}};
+  EXPECT_EQ(responses(rta_preemptive(), full, kFull), (Durations{1, 2, 12})) << "U = 1 exactly, in thirds";
+  EXPECT_FALSE(accepts(hyperbolic_blocking(), compiled(in_one_dag(full), kFull)));
 }
 
 // By hand: a job of 20 that started just before holds the only worker for 19 more.

@@ -17,7 +17,7 @@ const std::vector<Method> &executor_methods() {
 }
 
 const std::vector<Method> &methods_of(const executors::ExecutorKind &executor) {
-  static const std::vector<Method> kAnyOrder = {bertogna_cirinei_any(), graham(), long_paths(), dag_any()};
+  static const std::vector<Method> kAnyOrder = {bertogna_cirinei_any(), long_paths(), dag_any()};
   static const std::vector<Method> kWaitSet = [] {
     std::vector<Method> all = executor_methods();
     all.insert(all.end(), kAnyOrder.begin(), kAnyOrder.end());

@@ -45,7 +45,6 @@ void expect_holds(const Method &method, testing::BoundCaseLimits limits) {
 
 TEST(BoundProperty, OtherExecutorsKeepDagAny) { expect_holds(dag_any(), {.edges = true, .max_dags = 4}); }
 TEST(BoundProperty, OtherExecutorsKeepBertognaCirineiAny) { expect_holds(bertogna_cirinei_any(), {}); }
-TEST(BoundProperty, OtherExecutorsKeepGraham) { expect_holds(graham(), {.edges = true, .max_dags = 1}); }
 TEST(BoundProperty, OtherExecutorsKeepLongPaths) { expect_holds(long_paths(), {.edges = true, .max_dags = 1}); }
 
 TEST(Executors, OursHasAllMethodsAndPeersHaveTheirs) {

@@ -12,8 +12,6 @@
 #include "redag_analysis/many_workers/suspension_aware.hpp"
 #include "redag_analysis/one_worker/amc.hpp"
 #include "redag_analysis/one_worker/edf_demand.hpp"
-#include "redag_analysis/one_worker/exact_points.hpp"
-#include "redag_analysis/one_worker/linear_bound.hpp"
 #include "redag_analysis/one_worker/paper.hpp"
 #include "redag_analysis/one_worker/response_time.hpp"
 #include "redag_analysis/one_worker/utilization.hpp"
@@ -28,8 +26,6 @@ const std::vector<Method> &methods() {
       rta_deferred(),
       dag_one_worker_preemptive(),
       dag_one_worker_deferred(),
-      exact_points(),
-      linear_bound(),
       amc_rtb(),
       // One worker, edf
       edf_demand(),
@@ -43,7 +39,6 @@ const std::vector<Method> &methods() {
       dag_shapes(),
       dag_bounded(),
       dag_nonpreemptive(),
-      graham(),
       long_paths(),
       isolated(),
       dag_groups(),
@@ -55,12 +50,7 @@ const std::vector<Method> &methods() {
       edf_global_response(),
       edf_global_density(),
       // Utilization
-      liu_layland(),
-      hyperbolic(),
-      harmonic_chains(),
-      liu_layland_blocking(),
       hyperbolic_blocking(),
-      global_rm_light(),
       global_rm_utilization(),
       // The equations of the paper
       paper_rm_bound(),

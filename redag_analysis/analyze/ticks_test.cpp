@@ -132,8 +132,8 @@ TEST_P(CoarserClock, NoBoundIsBroken) {
       }
     }
   }
-  // These need criticalities, groups, or many light tasks.
-  const std::set<std::string_view> silent = {"amc_rtb", "dag_groups", "global_rm_light"};
+  // These need criticalities or groups.
+  const std::set<std::string_view> silent = {"amc_rtb", "dag_groups"};
   EXPECT_EQ(bounds == 0, silent.count(method.name) == 1) << bounds;
 }
 

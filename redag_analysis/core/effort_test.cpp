@@ -71,7 +71,7 @@ TEST(Effort, AMethodGivesUpAtItsLimitAndTheOthersAnswer) {
   EXPECT_TRUE(dear.gave_up());
   EXPECT_EQ(std::get<NotApplicable>(dear.outcome).reason, "more than 1 million steps");
   EXPECT_EQ(dear.verdict, Verdict::NotShown);
-  EXPECT_TRUE(report_of(report, "global_rm_light").bound()->accepts.value());
+  EXPECT_TRUE(report_of(report, "global_rm_utilization").bound()->accepts.value());
   EXPECT_FALSE(report_of(report, "dag_groups").gave_up()) << "does not apply";
   EXPECT_EQ(report.verdict, Verdict::Schedulable);
   EXPECT_FALSE(report_of(analyze(task_set), "bertogna_cirinei").gave_up()) << "the usual effort is enough";

@@ -125,7 +125,7 @@ TEST(TaskSet, WhatCutsOrRefusesJobsIsNotAnalysed) {
   threads.max_started = 3;
   EXPECT_EQ(compiled(two_dags(), threads).not_analysable, "");
   EXPECT_TRUE(compiled(two_dags(), threads).threads_suffice_if_bounded);
-  EXPECT_THAT(refusal(liu_layland(), two_dags(), threads), HasSubstr("fewer threads than tasks"));
+  EXPECT_THAT(refusal(hyperbolic_blocking(), two_dags(), threads), HasSubstr("fewer threads than tasks"));
   threads.max_started = 4;
   EXPECT_FALSE(compiled(two_dags(), threads).threads_suffice_if_bounded);
   EXPECT_EQ(compiled(two_dags(), threads).not_analysable, "");
@@ -204,17 +204,16 @@ TEST(NotApplicable, UtilizationNeedsTheOrderByRate) {
                                     PreemptionMode::Os, PolicyKind::Fixed);
   workload.dags[0].tasks[1].priority = 7;
   const AnalysisPlatform full = mode(sched::Preemption::Full);
-  EXPECT_THAT(refusal(liu_layland(), workload, full), HasSubstr("less urgent than a task of a larger period"));
+  EXPECT_THAT(refusal(hyperbolic_blocking(), workload, full), HasSubstr("less urgent than a task of a larger period"));
   workload.policy = PolicyKind::RateMonotonic;
-  EXPECT_EQ(refusal(liu_layland(), workload, full), "");
-  EXPECT_THAT(refusal(liu_layland(), workload, mode(sched::Preemption::None)), HasSubstr("with blocking"));
+  EXPECT_EQ(refusal(hyperbolic_blocking(), workload, full), "");
   EXPECT_EQ(refusal(hyperbolic_blocking(), workload, mode(sched::Preemption::None)), "");
   workload.dags[0].tasks[0].jitter = 1;
   EXPECT_THAT(refusal(hyperbolic_blocking(), workload, full), HasSubstr("jitter"));
   workload.dags[0].tasks[0].jitter = 0;
   workload.dags[0].tasks[0].deadline -= 1;
   EXPECT_THAT(refusal(global_rm_utilization(), workload, mode(sched::Preemption::Full, 2)), HasSubstr("deadline"));
-  EXPECT_THAT(refusal(global_rm_light(), workload, full), HasSubstr("two workers"));
+  EXPECT_THAT(refusal(global_rm_utilization(), workload, full), HasSubstr("two workers"));
 }
 
 }  // namespace

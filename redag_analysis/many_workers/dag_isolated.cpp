@@ -74,21 +74,12 @@ ResponseBound bound_of(const TaskSet &task_set, const GlobalUnit &unit, Duration
   return bound;
 }
 
-template <class Respond>
-Outcome apply_alone(const TaskSet &task_set, Respond respond) {
+Outcome apply_long_paths(const TaskSet &task_set) {
   if (auto reason = why_not_alone(task_set)) return NotApplicable{*reason};
   const GlobalUnit unit = global::unit_of(task_set, 0);
   const std::uint32_t workers = unit.bound > 0 ? unit.bound : task_set.platform.workers;
-  return from_units(task_set, {bound_of(task_set, unit, respond(task_set.units[0], workers))});
-}
-
-Outcome apply_graham(const TaskSet &task_set) {
-  return apply_alone(task_set, [](const Unit &unit, std::uint32_t workers) { return graham_response(unit, workers); });
-}
-
-Outcome apply_long_paths(const TaskSet &task_set) {
-  return apply_alone(
-      task_set, [&](const Unit &unit, std::uint32_t workers) { return long_paths_response(task_set, unit, workers); });
+  const Duration response = long_paths_response(task_set, task_set.units[0], workers);
+  return from_units(task_set, {bound_of(task_set, unit, response)});
 }
 
 // The most jobs of the DAG that can be started and unfinished at once.
@@ -199,19 +190,6 @@ std::optional<std::vector<std::uint32_t>> federated_bounds(const TaskSet &task_s
   }
   if (sum > task_set.platform.workers) return std::nullopt;
   return bounds;
-}
-
-Method graham() {
-  return Method{
-      .name = "graham",
-      .subject = Subject::Dag,
-      .cite = "R. Graham, Bounds on multiprocessing timing anomalies, SIAM Journal on Applied Mathematics 17(2), 1969",
-      .assumptions =
-          "a single DAG of one rate, any work-conserving order, preemption or not, max_active; R <= T; no shared "
-          "groups, not cooperative",
-      .complexity = "O(tasks + edges)",
-      .apply = apply_graham,
-  };
 }
 
 Method long_paths() {

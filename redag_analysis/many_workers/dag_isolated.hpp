@@ -27,9 +27,6 @@ enum class Heaviest : std::uint8_t { Longest, MostTasks };
 /// M. Lv, X. Jiang, W. Chang, RTSS 2022, theorem 1; j = 0 is the bound of R. Graham, 1969. O(workers (tasks + edges)).
 [[nodiscard]] Duration long_paths_response(const TaskSet &task_set, const Unit &unit, std::uint32_t workers);
 
-/// R = len + floor((vol - len) / m) for the only DAG. R. Graham, SIAM J. Applied Math. 17(2), 1969.
-[[nodiscard]] Method graham();
-
 /// long_paths_response() of the only DAG.
 [[nodiscard]] Method long_paths();
 

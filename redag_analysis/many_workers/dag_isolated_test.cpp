@@ -33,11 +33,6 @@ BoundCaseLimits graphs(sched::Preemption preemption) {
   return limits;
 }
 
-TEST(BoundProperty, Graham) {
-  expect_bound_holds(graham(), cases(graphs(sched::Preemption::Full)), {.workloads = 1000});
-  expect_bound_holds(graham(), cases(graphs(sched::Preemption::None)), {.workloads = 1000});
-}
-
 TEST(BoundProperty, LongPaths) {
   expect_bound_holds(long_paths(), cases(graphs(sched::Preemption::Full)), {.workloads = 1000});
   expect_bound_holds(long_paths(), cases(graphs(sched::Preemption::None)), {.workloads = 1000});
@@ -84,23 +79,9 @@ std::optional<Duration> dag_response(const Method &method, const TaskSet &task_s
 TEST(DagIsolated, LongPathsCountWhatRunsBesideThem) {
   // len 15, vol 32; paths of 15, 9 and 8. On three workers nothing waits; on two, j = 1 leaves 8 for one worker.
   const TaskSet three = compiled(3, {fork_join("d")}, sched::Preemption::Full);
-  EXPECT_EQ(dag_response(graham(), three, 0), 15 + 17 / 3);
   EXPECT_EQ(dag_response(long_paths(), three, 0), 15);
   const TaskSet two = compiled(2, {fork_join("d")}, sched::Preemption::Full);
   EXPECT_EQ(dag_response(long_paths(), two, 0), 15 + std::min(17 / 2, 8));
-}
-
-TEST(DagIsolated, LongPathsAreNeverAboveGraham) {
-  const BoundCaseLimits limits = graphs(sched::Preemption::Full);
-  for (std::uint64_t seed = 0; seed < 1000; ++seed) {
-    Rng rng(mix(seed));
-    const testing::BoundCase bound_case = random_bound_case(rng, limits);
-    const TaskSet task_set = compile(bound_case.workload, bound_case.platform).value();
-    if (!std::holds_alternative<Bound>(graham().apply(task_set))) continue;
-    const auto worse = dag_response(graham(), task_set, 0);
-    if (!worse) continue;
-    EXPECT_LE(dag_response(long_paths(), task_set, 0).value(), *worse) << describe(bound_case);
-  }
 }
 
 TEST(DagIsolated, BoundsThatSumUpToTheWorkersShareNothing) {

@@ -141,8 +141,7 @@ Outcome apply_rm_bound(const TaskSet &task_set) {
   bound.figures = text;
   // N callbacks are at least as many as tasks or DAGs, and the limit falls with N. The test is thus sound where Liu and
   // Layland's is.
-  const Outcome proper = liu_layland().apply(task_set);
-  if (const auto *reason = std::get_if<NotApplicable>(&proper)) bound.unsound = reason->reason;
+  bound.unsound = why_not_liu_layland(task_set).value_or("");
   return bound;
 }
 

@@ -10,7 +10,6 @@
 
 #include "redag/sched/policy.hpp"
 #include "redag_analysis/core/arithmetic.hpp"
-#include "redag_analysis/core/effort.hpp"
 #include "redag_analysis/core/exact_utilization.hpp"
 #include "redag_analysis/core/rate_edges.hpp"
 #include "redag_analysis/one_worker/one_worker.hpp"
@@ -113,121 +112,22 @@ Shares shares_of(const TaskSet &task_set) {
   return shares;
 }
 
-Outcome apply_liu_layland(const TaskSet &task_set) {
-  Prepared prepared;
-  if (auto reason = prepare(task_set, false, prepared)) return NotApplicable{*reason};
-  const Shares shares = shares_of(task_set);
-  return answer(is_within_liu_layland(shares, shares.size()),
-                figures("U", rounded(shares.sum()), liu_layland_limit(shares.size())));
-}
-
-Outcome apply_hyperbolic(const TaskSet &task_set) {
-  Prepared prepared;
-  if (auto reason = prepare(task_set, false, prepared)) return NotApplicable{*reason};
-  const Shares shares = shares_of(task_set);
-  return answer(is_within_hyperbolic(shares),
-                figures("prod (U_i + 1)", rounded(shares.product()), 2 * kUtilizationUnit));
-}
-
-// A maximum matching between periods and their multiples (Kuhn); each unmatched period starts a chain. Units of one
-// period are always in one chain, and therefore only different periods matter.
-class ChainCover {
- public:
-  explicit ChainCover(const TaskSet &task_set) {
-    for (const Unit &unit : task_set.units) periods_.push_back(unit.period);
-    std::sort(periods_.begin(), periods_.end());
-    periods_.erase(std::unique(periods_.begin(), periods_.end()), periods_.end());
-    next_.assign(periods_.size(), kNone);
-  }
-
-  std::size_t chains() {
-    std::size_t matched = 0;
-    for (std::size_t u = 0; u < periods_.size(); ++u) matched += extend(u) ? 1U : 0U;
-    return periods_.size() - matched;
-  }
-
- private:
-  static constexpr std::size_t kNone = SIZE_MAX;
-
-  // Searches breadth first from the unmatched `root`; returns true if it found an augmenting path.
-  bool extend(std::size_t root) {
-    std::vector<std::size_t> reached_by(periods_.size(), kNone);  // by longer period
-    std::vector<std::size_t> waiting = {root};
-    for (std::size_t i = 0; i < waiting.size(); ++i) {
-      const std::size_t u = waiting[i];
-      Effort::spend(periods_.size() - u);
-      for (std::size_t v = u + 1; v < periods_.size(); ++v) {
-        if (reached_by[v] != kNone || periods_[v] % periods_[u] != 0) continue;
-        reached_by[v] = u;
-        if (next_[v] != kNone) {
-          waiting.push_back(next_[v]);
-          continue;
-        }
-        turn_around(v, root, reached_by);
-        return true;
-      }
-    }
-    return false;
-  }
-
-  void turn_around(std::size_t last, std::size_t root, const std::vector<std::size_t> &reached_by) {
-    for (std::size_t v = last;;) {
-      const std::size_t u = reached_by[v];
-      const std::size_t before = match_of(u);
-      next_[v] = u;
-      if (u == root) return;
-      v = before;
-    }
-  }
-
-  // The longer period that `u` is matched with.
-  [[nodiscard]] std::size_t match_of(std::size_t u) const {
-    return static_cast<std::size_t>(std::find(next_.begin(), next_.end(), u) - next_.begin());
-  }
-
-  std::vector<Duration> periods_;  // different values, ascending
-  std::vector<std::size_t> next_;  // by longer period: its predecessor in its chain
-};
-
-Outcome apply_harmonic_chains(const TaskSet &task_set) {
-  Prepared prepared;
-  if (auto reason = prepare(task_set, false, prepared)) return NotApplicable{*reason};
-  const std::size_t chains = ChainCover(task_set).chains();
-  const Shares shares = shares_of(task_set);
-  return answer(is_within_liu_layland(shares, chains), figures("U", rounded(shares.sum()), liu_layland_limit(chains)) +
-                                                           ", " + std::to_string(chains) + " harmonic chains");
-}
-
 // Tests level by level, each with its blocking; the answer names the first level above its limit.
-template <class Within, class Figures>
-Outcome apply_by_level(const TaskSet &task_set, Within is_within, Figures figures_of) {
+Outcome apply_hyperbolic_blocking(const TaskSet &task_set) {
   Prepared prepared;
   if (auto reason = prepare(task_set, true, prepared)) return NotApplicable{*reason};
   Shares shares;
   for (std::size_t i = 0; i < prepared.order.size(); ++i) {
     const Unit &unit = task_set.units[prepared.order[i]];
     shares.push(share_of(unit, prepared.blocking[i]));
-    if (!is_within(shares)) {
-      return answer(false, figures_of(shares) + " at '" + task_set.tasks[unit.tasks.front()].name + "'");
+    if (!is_within_hyperbolic(shares)) {
+      return answer(false, figures("product", rounded(shares.product()), 2 * kUtilizationUnit) + " at '" +
+                               task_set.tasks[unit.tasks.front()].name + "'");
     }
     shares.pop();
     shares.push(share_of(unit));
   }
   return answer(true, "every level is within its limit");
-}
-
-Outcome apply_liu_layland_blocking(const TaskSet &task_set) {
-  return apply_by_level(
-      task_set, [](const Shares &shares) { return is_within_liu_layland(shares, shares.size()); },
-      [](const Shares &shares) {
-        return figures("U + B / T", rounded(shares.sum()), liu_layland_limit(shares.size()));
-      });
-}
-
-Outcome apply_hyperbolic_blocking(const TaskSet &task_set) {
-  return apply_by_level(
-      task_set, [](const Shares &shares) { return is_within_hyperbolic(shares); },
-      [](const Shares &shares) { return figures("product", rounded(shares.product()), 2 * kUtilizationUnit); });
 }
 
 // Returns why a global test does not apply. It needs m workers, full preemption and independent tasks, and that only
@@ -261,18 +161,6 @@ Shares largest(const Shares &shares) {
   return one;
 }
 
-Outcome apply_global_rm_light(const TaskSet &task_set) {
-  if (auto reason = why_not_global(task_set)) return NotApplicable{*reason};
-  const std::uint64_t m = task_set.platform.workers;
-  const Shares shares = shares_of(task_set);
-  const Shares most = largest(shares);
-  const bool fits = is_sum_within(shares, m * m, 3 * m - 2) && is_sum_within(most, m, 3 * m - 2);
-  const auto divisor = static_cast<Int128>(3 * m - 2);
-  return answer(fits, figures("U", rounded(shares.sum()), static_cast<Int128>(m * m) * kUtilizationUnit / divisor) +
-                          "; " +
-                          figures("max U_i", rounded(most.sum()), static_cast<Int128>(m) * kUtilizationUnit / divisor));
-}
-
 Outcome apply_global_rm_utilization(const TaskSet &task_set) {
   if (auto reason = why_not_global(task_set)) return NotApplicable{*reason};
   const std::uint64_t m = task_set.platform.workers;
@@ -286,74 +174,43 @@ Outcome apply_global_rm_utilization(const TaskSet &task_set) {
   return answer(is_sum_within(most, 1, 1) && is_sum_within(weighted, m, 1), figures("U", rounded(shares.sum()), limit));
 }
 
-Method make(std::string_view name, std::string_view cite, std::string_view assumptions, std::string_view complexity,
-            Outcome (*apply)(const TaskSet &)) {
-  return Method{
-      .name = name,
-      .subject = Subject::TaskSet,
-      .cite = cite,
-      .assumptions = assumptions,
-      .complexity = complexity,
-      .quick = true,
-      .apply = apply,
-  };
-}
-
-constexpr std::string_view kOneWorker =
-    "one worker, full preemption, rate-monotonic order, D >= T, no jitter, no blocking; a DAG of one rate counts as "
-    "one task with C = volume";
-constexpr std::string_view kOneWorkerBlocking =
-    "one worker, any preemption, rate-monotonic order, D >= T, no jitter; a DAG of one rate counts as one task with C "
-    "= volume";
-constexpr std::string_view kGlobal =
-    "m >= 2 workers, full preemption, rate-monotonic order, independent tasks, D >= T, no jitter, groups, max_active "
-    "or levels that different rates share";
-
 }  // namespace
 
-Method liu_layland() {
-  return make("liu_layland",
-              "C. Liu, J. Layland, Scheduling algorithms for multiprogramming in a hard-real-time environment, Journal "
-              "of the ACM 20(1), 1973",
-              kOneWorker, "O(n)", apply_liu_layland);
-}
-
-Method hyperbolic() {
-  return make("hyperbolic",
-              "E. Bini, G. C. Buttazzo, G. M. Buttazzo, Rate monotonic analysis: the hyperbolic bound, IEEE "
-              "Transactions on Computers 52(7), 2003",
-              kOneWorker, "O(n)", apply_hyperbolic);
-}
-
-Method harmonic_chains() {
-  return make("harmonic_chains", "T.-W. Kuo, A. K. Mok, Load adjustment in adaptive real-time systems, RTSS 1991",
-              kOneWorker, "O(n), and a maximum matching of the different periods", apply_harmonic_chains);
-}
-
-Method liu_layland_blocking() {
-  return make(
-      "liu_layland_blocking",
-      "L. Sha, R. Rajkumar, J. Lehoczky, Priority inheritance protocols, IEEE Transactions on Computers 39(9), 1990",
-      kOneWorkerBlocking, "O(n log n)", apply_liu_layland_blocking);
+std::optional<std::string> why_not_liu_layland(const TaskSet &task_set) {
+  Prepared prepared;
+  return prepare(task_set, false, prepared);
 }
 
 Method hyperbolic_blocking() {
-  return make("hyperbolic_blocking",
-              "the hyperbolic bound (Bini, Buttazzo, Buttazzo 2003) with the blocking of Sha, Rajkumar, Lehoczky 1990",
-              kOneWorkerBlocking, "O(n log n)", apply_hyperbolic_blocking);
-}
-
-Method global_rm_light() {
-  return make("global_rm_light",
-              "B. Andersson, S. Baruah, J. Jonsson, Static-priority scheduling on multiprocessors, RTSS 2001", kGlobal,
-              "O(n)", apply_global_rm_light);
+  return Method{
+      .name = "hyperbolic_blocking",
+      .subject = Subject::TaskSet,
+      .cite =
+          "the hyperbolic bound (E. Bini, G. C. Buttazzo, G. M. Buttazzo, IEEE Transactions on Computers 52(7), "
+          "2003) with the blocking of L. Sha, R. Rajkumar, J. Lehoczky, ibid. 39(9), 1990",
+      .assumptions =
+          "one worker, any preemption, rate-monotonic order, D >= T, no jitter; a DAG of one rate counts as one task "
+          "with C = volume",
+      .complexity = "O(n log n)",
+      .quick = true,
+      .apply = apply_hyperbolic_blocking,
+  };
 }
 
 Method global_rm_utilization() {
-  return make("global_rm_utilization",
-              "M. Bertogna, M. Cirinei, G. Lipari, New schedulability tests for real-time task sets scheduled by "
-              "deadline monotonic on multiprocessors, OPODIS 2005",
-              kGlobal, "O(n)", apply_global_rm_utilization);
+  return Method{
+      .name = "global_rm_utilization",
+      .subject = Subject::TaskSet,
+      .cite =
+          "M. Bertogna, M. Cirinei, G. Lipari, New schedulability tests for real-time task sets scheduled by "
+          "deadline monotonic on multiprocessors, OPODIS 2005",
+      .assumptions =
+          "m >= 2 workers, full preemption, rate-monotonic order, independent tasks, D >= T, no jitter, groups, "
+          "max_active or levels that different rates share",
+      .complexity = "O(n)",
+      .quick = true,
+      .apply = apply_global_rm_utilization,
+  };
 }
 
 }  // namespace redag::analysis

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "redag_analysis/core/exact_utilization.hpp"
+#include "redag_analysis/one_worker/paper.hpp"
 #include "redag_testing/bound_property.hpp"
 #include "redag_testing/builders.hpp"
 
@@ -44,18 +45,11 @@ BoundCaseLimits with_blocking(sched::Preemption preemption) {
 
 const testing::BoundPropertyOptions kFew{.workloads = 250};
 
-TEST(BoundProperty, LiuLayland) {
-  expect_bound_holds(liu_layland(), cases(rate_monotonic(sched::Preemption::Full)), kFew);
-}
-
-TEST(BoundProperty, LiuLaylandOnDags) {
+TEST(BoundProperty, Hyperbolic) {
+  expect_bound_holds(hyperbolic_blocking(), cases(rate_monotonic(sched::Preemption::Full)), kFew);
   BoundCaseLimits limits = rate_monotonic(sched::Preemption::Full);
   limits.edges = limits.caps = true;
-  expect_bound_holds(liu_layland(), cases(limits), kFew);
-}
-
-TEST(BoundProperty, Hyperbolic) {
-  expect_bound_holds(hyperbolic(), cases(rate_monotonic(sched::Preemption::Full)), kFew);
+  expect_bound_holds(hyperbolic_blocking(), cases(limits), kFew);
 }
 
 // Equals of one period, and of several.
@@ -65,7 +59,7 @@ TEST(BoundProperty, UtilizationOfEquals) {
     limits.policies = {PolicyKind::Fixed};
     limits.max_dags = 3;
     limits.max_utilization = 0.9;
-    expect_bound_holds(mode == sched::Preemption::Full ? hyperbolic() : hyperbolic_blocking(), cases(limits), kFew);
+    expect_bound_holds(hyperbolic_blocking(), cases(limits), kFew);
   }
   BoundCaseLimits limits = rate_monotonic(sched::Preemption::Full);
   limits.policies = {PolicyKind::Fixed, PolicyKind::RateMonotonic};
@@ -76,20 +70,11 @@ TEST(BoundProperty, UtilizationOfEquals) {
   expect_bound_holds(global_rm_utilization(), cases(limits), kFew);
 }
 
-TEST(BoundProperty, HarmonicChains) {
-  BoundCaseLimits limits = rate_monotonic(sched::Preemption::Full);
-  limits.max_period = 16;
-  limits.max_dags = 4;
-  expect_bound_holds(harmonic_chains(), cases(limits), kFew);
-}
-
 TEST(BoundProperty, BlockingPreemptive) {
-  expect_bound_holds(liu_layland_blocking(), cases(with_blocking(sched::Preemption::Full)), kFew);
   expect_bound_holds(hyperbolic_blocking(), cases(with_blocking(sched::Preemption::Full)), kFew);
 }
 
 TEST(BoundProperty, BlockingNonpreemptive) {
-  expect_bound_holds(liu_layland_blocking(), cases(with_blocking(sched::Preemption::None)), kFew);
   BoundCaseLimits limits = with_blocking(sched::Preemption::None);
   limits.edges = true;
   expect_bound_holds(hyperbolic_blocking(), cases(limits), kFew);
@@ -108,7 +93,6 @@ TEST(BoundProperty, GlobalRateMonotonic) {
   limits.max_dags = 12;
   limits.min_utilization = 0.2;
   limits.max_utilization = 0.6;
-  expect_bound_holds(global_rm_light(), cases(limits), kFew);
   expect_bound_holds(global_rm_utilization(), cases(limits), kFew);
 }
 
@@ -127,11 +111,9 @@ TEST(ExactUtilization, HyperbolicAtTwo) {
   const auto loads = [](Duration more) {
     return std::vector<Load>{{kTick, 3 * kTick}, {kTick, 4 * kTick}, {kTick + more, 5 * kTick}};
   };
-  for (const Method &method : {hyperbolic(), hyperbolic_blocking()}) {
-    EXPECT_TRUE(accepts(method, independent(loads(0)))) << method.name;
-    EXPECT_TRUE(accepts(method, independent(loads(-1)))) << method.name;
-    EXPECT_FALSE(accepts(method, independent(loads(1)))) << method.name;
-  }
+  EXPECT_TRUE(accepts(hyperbolic_blocking(), independent(loads(0))));
+  EXPECT_TRUE(accepts(hyperbolic_blocking(), independent(loads(-1))));
+  EXPECT_FALSE(accepts(hyperbolic_blocking(), independent(loads(1))));
 }
 
 // One nanosecond beside periods so long that it is a fraction of 2^-60.
@@ -141,17 +123,14 @@ TEST(ExactUtilization, HyperbolicWithinTheLastBit) {
   const auto loads = [](Duration more) {
     return std::vector<Load>{{kLong / 3 / 2, kLong / 2}, {kLong / 2 + more, kLong}};
   };
-  EXPECT_TRUE(accepts(hyperbolic(), independent(loads(0))));
-  EXPECT_TRUE(accepts(hyperbolic(), independent(loads(-1))));
-  EXPECT_FALSE(accepts(hyperbolic(), independent(loads(1))));
+  EXPECT_TRUE(accepts(hyperbolic_blocking(), independent(loads(0))));
+  EXPECT_TRUE(accepts(hyperbolic_blocking(), independent(loads(-1))));
+  EXPECT_FALSE(accepts(hyperbolic_blocking(), independent(loads(1))));
 }
 
-TEST(ExactUtilization, OneWholeOfSharesThatHaveNoEnd) {
-  EXPECT_TRUE(accepts(harmonic_chains(), independent({{1, 3}, {2, 6}, {4, 12}})));
-  EXPECT_TRUE(accepts(harmonic_chains(), independent({{1, 3}, {2, 6}, {3, 12}})));
-  EXPECT_FALSE(accepts(harmonic_chains(), independent({{1, 3}, {2, 6}, {5, 12}})));
-  EXPECT_TRUE(accepts(liu_layland(), independent({{7, 7}})));
-  EXPECT_TRUE(accepts(liu_layland_blocking(), independent({{7, 7}})));
+TEST(ExactUtilization, OneWhole) {
+  EXPECT_TRUE(accepts(paper_rm_bound(), independent({{7, 7}})));
+  EXPECT_TRUE(accepts(hyperbolic_blocking(), independent({{7, 7}})));
 }
 
 // The limit of two tasks is 2 sqrt(2) - 2. The test takes the nearest fractions on both sides, from the continued
@@ -168,7 +147,7 @@ TEST(ExactUtilization, LiuLaylandBesideAnIrrationalLimit) {
     const auto wcet = static_cast<Duration>(p - q);
     const auto period = static_cast<Duration>(q);
     const bool is_below = p * p < 2 * q * q;
-    EXPECT_EQ(accepts(liu_layland(), independent({{wcet, period}, {wcet, period}})), is_below) << period;
+    EXPECT_EQ(accepts(paper_rm_bound(), independent({{wcet, period}, {wcet, period}})), is_below) << period;
     ++(is_below ? below : above);
   }
   EXPECT_GT(below, 10);
@@ -176,11 +155,6 @@ TEST(ExactUtilization, LiuLaylandBesideAnIrrationalLimit) {
 }
 
 TEST(ExactUtilization, SeveralWorkers) {
-  // m = 2: U <= 1, max U_i <= 1/2.
-  EXPECT_TRUE(accepts(global_rm_light(), independent({{1, 3}, {2, 6}, {4, 12}}, 2)));
-  EXPECT_FALSE(accepts(global_rm_light(), independent({{1, 3}, {2, 6}, {5, 12}}, 2)));
-  EXPECT_TRUE(accepts(global_rm_light(), independent({{50, 100}, {51, 102}}, 2)));
-  EXPECT_FALSE(accepts(global_rm_light(), independent({{50, 100}, {52, 102}}, 2)));
   // m = 2: U <= 1 for any u; m = 3: U <= 3/2 - u/2.
   EXPECT_TRUE(accepts(global_rm_utilization(), independent({{1, 3}, {2, 6}, {4, 12}}, 2)));
   EXPECT_FALSE(accepts(global_rm_utilization(), independent({{1, 3}, {2, 6}, {5, 12}}, 2)));

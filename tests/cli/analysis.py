@@ -151,9 +151,9 @@ dags:
             self.assertTrue(name.startswith("paper_") or f"`{name}`" in page, name)
 
     def test_methods_of_choice(self):
-        once = json.loads(self.expect(redag("analyze", self.cart, "--json", "--methods", "--method", "graham", "--method",
+        once = json.loads(self.expect(redag("analyze", self.cart, "--json", "--methods", "--method", "isolated", "--method",
                                             "dag_one_worker_deferred"), 0).stdout)
-        self.assertEqual([method["name"] for method in once["methods"]], ["dag_one_worker_deferred", "graham"])
+        self.assertEqual([method["name"] for method in once["methods"]], ["dag_one_worker_deferred", "isolated"])
         every = json.loads(redag("analyze", self.cart, "--json", "--methods", "--preemption", "os").stdout)
         tightest = {}
         for method in every["methods"]:
@@ -165,7 +165,7 @@ dags:
                 if task["bound_ns"] is not None and method["sound"]:
                     tightest[task["name"]] = min(task["bound_ns"], tightest.get(task["name"], task["bound_ns"]))
         self.assertEqual(tightest, {task["name"]: task["bound_ns"] for task in every["tasks"]})
-        self.expect(redag("analyze", self.cart, "--method", "grahm"), 2, "did you mean 'graham'?")
+        self.expect(redag("analyze", self.cart, "--method", "isolatd"), 2, "did you mean 'isolated'?")
         self.expect(redag("analyze", self.cart, "--method", "quite_another"), 2, "one of ")
         self.assertNotIn("tasks", json.loads(redag("analyze", self.cart, "--json").stdout)["methods"][0])
 

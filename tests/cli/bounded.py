@@ -91,13 +91,13 @@ class Limits(Case):
     def test_a_method_gives_up_and_the_others_answer(self):
         many = self.write("many.yaml", independent(MANY, 2))
         text = self.expect(redag("analyze", many, "--effort", 1), 0).stdout
-        self.assertIn("schedulable: every deadline is met, by global_rm_light", text)
+        self.assertIn("schedulable: every deadline is met, by global_rm_utilization", text)
         self.assertIn("gave up on bertogna_cirinei: more than 1 million steps\n", text)
         self.assertIn("--effort and --time-limit set these limits", text)
         document = json.loads(self.expect(redag("analyze", many, "--effort", 1, "--json"), 0).stdout)
         gave_up = {method["name"]: method["reason"] for method in document["methods"] if method["gave_up"]}
         self.assertEqual(gave_up["bertogna_cirinei"], "more than 1 million steps")
-        self.assertNotIn("global_rm_light", gave_up)
+        self.assertNotIn("global_rm_utilization", gave_up)
         self.assertTrue(document["schedulable"])
 
     def test_a_time_limit(self):

@@ -45,7 +45,7 @@ ACCEPTANCE = """\
 experiment: acceptance
 sets: 4
 utilization: [0.5, 0.9]
-methods: [melani, graham]
+methods: [melani, dag_bounded]
 """
 FACTORIAL = """\
 experiment: factorial

@@ -13,14 +13,14 @@
 namespace redag::cli {
 namespace {
 
-Workload short_deadline() {
+Workload tight_deadline() {
   return testing::make_workload({testing::make_dag("a", {{"t", 10, 3}}),
                                  testing::make_dag("b", {{.name = "t", .period = 20, .wcet = 2, .deadline = 4}})},
                                 1, PreemptionMode::Os);
 }
 
 TEST(SensitivityReport, FactorsAreNeverRoundedUp) {
-  Workload workload = short_deadline();
+  Workload workload = tight_deadline();
   workload.dags[1].tasks[0].deadline = 20 * kMillisecond;
   Sensitivity sensitivity;
   const analysis::AnalysisPlatform platform = analysis::platform_of(workload);
@@ -42,7 +42,7 @@ TEST(SensitivityReport, FactorsAreNeverRoundedUp) {
 
 // A reason that limits many rows stands below the table once, and in the document with each.
 TEST(SensitivityReport, ReasonsStandBelowTheTableOnce) {
-  Workload workload = short_deadline();
+  Workload workload = tight_deadline();
   for (Dag &dag : workload.dags) dag.tasks[0].budget = kMillisecond;  // below the wcet: no method applies
   const analysis::AnalysisPlatform platform = analysis::platform_of(workload);
   Sensitivity sensitivity;

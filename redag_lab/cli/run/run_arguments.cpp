@@ -66,9 +66,7 @@ void add_overhead_arguments(CLI::App &app, RunArguments &arguments, const std::s
 }
 
 void add_workload_arguments(CLI::App &app, RunArguments &arguments, const char *file_help) {
-  app.add_option("FILE", arguments.file, file_help)
-      ->type_name("WORKLOAD")
-      ->required();
+  app.add_option("FILE", arguments.file, file_help)->type_name("WORKLOAD")->required();
   add_duration(app, "--duration", arguments.duration, "Length of the run: the time in which jobs are released");
   add_duration(app, "--warm-up", arguments.warm_up, "Do not count jobs released in this time at the start", true);
   add_duration(app, "--warmup", arguments.warm_up, "Former name of --warm-up", true)->group("");  // not in --help
