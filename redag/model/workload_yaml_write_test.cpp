@@ -65,8 +65,6 @@ Workload arbitrary_workload() {
   options.groups = 2;
   options.group_share = 0.3;
   options.queue_share = 0.3;
-  options.high_share = 0.3;
-  options.low_share = 0.3;
   Workload workload = generate(options, *rc::gen::arbitrary<std::uint64_t>()).value();
   workload.platform.preemption = *rc::gen::element(PreemptionMode::None, PreemptionMode::Cooperative);
   workload.ties = *rc::gen::element(Ties::Share, Ties::Fixed);
@@ -75,6 +73,7 @@ Workload arbitrary_workload() {
   for (Dag &dag : workload.dags) {
     dag.max_pending = *rc::gen::inRange(0U, 3U);
     dag.deadline = *rc::gen::element<Duration>(0, 7 * kMillisecond);
+    dag.criticality = *rc::gen::element(Criticality::Low, Criticality::Normal, Criticality::High);
     if (dag.criticality != Criticality::High) {
       dag.degrade = *rc::gen::element(Degrade{}, Degrade{Degrade::Kind::Skip, 3, 2},
                                       Degrade{Degrade::Kind::Stretch, 1, 1.0 / 3 + 1});
