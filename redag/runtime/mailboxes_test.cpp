@@ -231,7 +231,7 @@ TEST_F(MailboxesTest, AThreadLeavesTinyJobsToAnotherThatRunsThem) {
 
 TEST(MailboxesAlone, WithoutALookoutAllMailWakesItsThread) {
   WorkerPool pool(1, 0);
-  Mailboxes mailboxes(1, nullptr);
+  Mailboxes mailboxes(1, nullptr, true);
   TaskEntry tiny;
   for (int i = 0; i < 8; ++i) tiny.count(0, 0);
   WorkerThread running(1, 0);
@@ -239,7 +239,7 @@ TEST(MailboxesAlone, WithoutALookoutAllMailWakesItsThread) {
   WakeUps wake_ups(true);
   for (int i = 0; i < 3; ++i) {
     mailboxes.add_idle(pool[0]);
-    mailboxes.post(tiny, 0, -1, wake_ups, [](WorkerThread &) {});
+    mailboxes.post(tiny, 0, -1, &running, wake_ups, [](WorkerThread &) {});
     ASSERT_TRUE(pool[0].parker.spin(1));
     pool[0].parker.park();
     ASSERT_TRUE(pool[0].take_mail());
