@@ -28,7 +28,6 @@ SYSTEM_KEYS = {
     "libgmock-dev": "libgmock-dev",
     "libgtest-dev": "libgtest-dev",
     "libncurses-dev": "libncurses-dev",
-    "libsqlite3-dev": "libsqlite3-dev",
     "libyaml-dev": "libyaml-dev",
     "nlohmann-json-dev": "nlohmann-json3-dev",
     "pkg-config": "pkg-config",
@@ -41,11 +40,10 @@ ROS_KEYS = {"ament_cmake", "ament_index_python", "composition_interfaces", "diag
             "rosbag2_compression", "rosbag2_compression_zstd", "rosbag2_cpp", "rosbag2_storage",
             "rosbag2_storage_default_plugins", "rosgraph_msgs", "std_msgs", "std_srvs", "test_msgs", "tracetools"}
 # Names that find_package() looks for, with the rosdep key that installs them. The C library has the threads,
-# and packages are built without MPI and LTTng.
+# and packages are built without LTTng.
 CMAKE_PACKAGES = {"fmt": "fmt", "nlohmann_json": "nlohmann-json-dev", "tl-expected": "libexpected-dev",
                   "CLI11": "cli11", "TBB": "tbb", "GTest": "libgtest-dev", "LibYAML": "libyaml-dev", "ZLIB": "zlib",
-                  "SQLite3": "libsqlite3-dev", "Curses": "libncurses-dev", "PkgConfig": "pkg-config", "MPI": None,
-                  "LttngUst": None, "Threads": None}
+                  "Curses": "libncurses-dev", "PkgConfig": "pkg-config", "LttngUst": None, "Threads": None}
 # Folders that headers are included from, with the rosdep key that installs them. Others have the name of their package.
 HEADER_FOLDERS = {"fmt": "fmt", "nlohmann": "nlohmann-json-dev", "tl": "libexpected-dev", "CLI": "cli11", "tbb": "tbb",
                   "oneapi": "tbb", "gtest": "libgtest-dev", "gmock": "libgmock-dev", "arpa": None, "sys": None, "linux": None, "bits": None}

@@ -5,25 +5,25 @@
 
 #include <algorithm>
 #include <limits>
-#include <utility>
+#include <span>
 
 #include <fmt/format.h>
 
 #include "redag/base/check.hpp"
+#include "redag/base/rng.hpp"
 #include "redag/model/workload_yaml.hpp"
+#include "redag/sched/priority_scheduler.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
-#include "redag_lab/experiment/seed.hpp"
-#include "redag_lab/experiment/simulated_misses.hpp"
+#include "redag_analysis/metrics/deadline_watch.hpp"
+#include "redag_analysis/sim/simulator.hpp"
 
 namespace redag::experiment {
 namespace {
 
 constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
+constexpr std::size_t kMostReplays = 20;
 
-std::uint64_t workload_seed(const AcceptancePlan &plan, const AcceptancePoint &point, std::uint64_t repetition) {
-  return derive_seed(plan.seed, {point.dags, point.workers, static_cast<std::uint64_t>(point.deadlines),
-                                 point.utilization, repetition});
-}
+enum Place : std::size_t { kAtDags, kAtWorkers, kAtDeadlines, kAtPreemption, kAtUtilization };  // of factors_of()
 
 char verdict_of(const analysis::MethodReport &report) {
   if (report.bound() == nullptr) return kNotApplicable;
@@ -46,34 +46,94 @@ void make_deadlines_end_to_end(Workload &workload) {
   }
 }
 
-}  // namespace
-
-std::string describe(const AcceptancePoint &point) {
-  return fmt::format("{} DAGs, {} workers, {} deadlines, preemption {}, utilization {}", point.dags, point.workers,
-                     to_string(point.deadlines), to_string(point.preemption),
-                     point.utilization / static_cast<double>(kMillion));
+// Returns the workload of all runs: every job takes its wcet, and none is released before time 0.
+Workload at_worst(const Workload &workload) {
+  Workload worst = workload;
+  for (Dag &dag : worst.dags) {
+    for (Task &task : dag.tasks) {
+      task.bcet = task.wcet;
+      task.execution = ExecutionTime{};
+      task.offset = 0;
+    }
+  }
+  return worst;
 }
 
-std::uint64_t unit_count(const AcceptancePlan &plan) { return points_of(plan).size() * plan.sets; }
+// Draws an offset for each unit; its tasks are released together.
+void draw_offsets(Workload &workload, const analysis::TaskSet &task_set, Rng &rng) {
+  std::vector<Duration> offsets;
+  for (const analysis::Unit &unit : task_set.units) offsets.push_back(rng.uniform(0, unit.period - 1));
+  std::size_t id = 0;
+  for (Dag &dag : workload.dags) {
+    for (Task &task : dag.tasks) {
+      if (task.activation == Activation::Timer) task.offset = offsets[task_set.tasks[id].unit];
+      ++id;
+    }
+  }
+}
 
-lab::GenerateOptions generate_options(const AcceptancePlan &plan, const AcceptancePoint &point) {
+}  // namespace
+
+std::optional<SeenMiss> find_miss(const Workload &workload, const analysis::TaskSet &task_set,
+                                  const SimulationEffort &effort, std::uint64_t seed) {
+  Duration slowest = 0;
+  for (const analysis::CompiledTask &task : task_set.tasks) slowest = std::max(slowest, task.period);
+  const sched::Config config = sched::config_of(workload);
+  SeenMiss run{at_worst(workload), 0, 0};
+  for (std::uint32_t i = 0; i <= effort.offsets; ++i) {
+    run.seed = derive_seed(seed, {i});
+    if (i > 0) {
+      Rng rng(run.seed);
+      draw_offsets(run.workload, task_set, rng);
+    }
+    run.duration = slowest * (effort.periods + (i > 0 ? 1 : 0));
+    sim::Options options;
+    options.horizon = run.duration;
+    options.seed = run.seed;
+    sched::PriorityScheduler scheduler(run.workload, config);
+    metrics::DeadlineWatch watch(run.workload);
+    bool missed = false;
+    const auto see = [&missed](const metrics::JudgedJob &job) { missed = missed || job.miss != metrics::Miss::None; };
+    const sim::Result result =
+        sim::simulate(run.workload, scheduler, config.workers, options, [&](std::span<const JobEvent> events) {
+          watch.add(events, see);
+          return !missed;
+        });
+    watch.finish(result.end, see);
+    if (missed) return run;
+  }
+  return std::nullopt;
+}
+
+const char *to_string(DeadlineKind value) { return value == DeadlineKind::Implicit ? "implicit" : "constrained"; }
+
+std::vector<Factor> factors_of(const AcceptancePlan &plan) {
+  const auto number = [](auto value) { return fmt::format("{}", value); };
+  const auto name = [](auto value) { return to_string(value); };
+  return {{"dags", texts(plan.dags, number), true},
+          {"workers", texts(plan.workers, number), true},
+          {"deadlines", texts(plan.deadlines, name), false},
+          {"preemption", texts(plan.preemption, name), false},
+          {"utilization", texts(plan.utilization, [&](std::uint32_t u) { return number(share(u)); }), true}};
+}
+
+lab::GenerateOptions generate_options(const AcceptancePlan &plan, const Point &point) {
   lab::GenerateOptions options = plan.workload;
-  options.dags = point.dags;
-  options.workers = point.workers;
-  options.preemption = point.preemption;
-  options.utilization = static_cast<double>(point.utilization) * point.workers / kMillion;
-  options.deadline_min = point.deadlines == DeadlineKind::Implicit ? 1.0 : 0.5;
+  options.dags = plan.dags[point[kAtDags]];
+  options.workers = plan.workers[point[kAtWorkers]];
+  options.preemption = plan.preemption[point[kAtPreemption]];
+  options.utilization = static_cast<double>(plan.utilization[point[kAtUtilization]]) * options.workers / kMillion;
+  options.deadline_min = plan.deadlines[point[kAtDeadlines]] == DeadlineKind::Implicit ? 1.0 : 0.5;
   options.deadline_max = 1.0;
   return options;
 }
 
-Result<Workload> draw_workload(const AcceptancePlan &plan, const AcceptancePoint &point, std::uint64_t repetition) {
-  Result<Workload> workload = generate(generate_options(plan, point), workload_seed(plan, point, repetition));
-  if (workload) make_deadlines_end_to_end(*workload);
-  return workload;
-}
-
-Acceptance::Acceptance(AcceptancePlan plan) : plan_(std::move(plan)), points_(points_of(plan_)) {
+Acceptance::Acceptance(AcceptancePlan plan)
+    : plan_(std::move(plan)),
+      factors_(factors_of(plan_)),
+      points_(points_of(factors_, [](std::size_t, const Point &) { return true; })),
+      sets_(points_.size()),
+      counts_(points_.size(), std::vector<Count>(plan_.methods.size())) {
   for (std::size_t i = 0; i < plan_.methods.size(); ++i) {
     const std::string &name = plan_.methods[i];
     const auto &known = analysis::methods();
@@ -86,15 +146,27 @@ Acceptance::Acceptance(AcceptancePlan plan) : plan_(std::move(plan)), points_(po
   }
 }
 
-Result<std::string> Acceptance::evaluate(std::uint64_t unit) const {
-  const AcceptancePoint &point = point_of(unit);
-  const std::uint64_t repetition = unit / points_.size();
-  const Result<Workload> workload = draw_workload(plan_, point, repetition);
-  if (!workload) {
-    Diagnostics mistakes = workload.error();
-    mistakes.front().message += fmt::format(" ({}, repetition {})", describe(point), repetition);
-    return tl::unexpected<Diagnostics>(std::move(mistakes));
+std::uint64_t Acceptance::seed_of(std::uint64_t unit) const {
+  const Point &point = points_[unit % points_.size()];
+  return derive_seed(plan_.seed, {plan_.dags[point[kAtDags]], plan_.workers[point[kAtWorkers]],
+                                  static_cast<std::uint64_t>(plan_.deadlines[point[kAtDeadlines]]),
+                                  plan_.utilization[point[kAtUtilization]], unit / points_.size()});
+}
+
+Result<Workload> Acceptance::draw(std::uint64_t unit) const {
+  const Point &point = points_[unit % points_.size()];
+  Result<Workload> workload = generate(generate_options(plan_, point), seed_of(unit));
+  if (workload) {
+    make_deadlines_end_to_end(*workload);
+  } else {
+    workload.error().front().message += fmt::format(" ({})", describe(factors_, point));
   }
+  return workload;
+}
+
+Result<std::string> Acceptance::evaluate(std::uint64_t unit) const {
+  const Result<Workload> workload = draw(unit);
+  if (!workload) return tl::unexpected<Diagnostics>(workload.error());
   const Result<analysis::TaskSet> task_set = analysis::compile(*workload, analysis::platform_of(*workload));
   if (!task_set) return tl::unexpected<Diagnostics>(task_set.error());
 
@@ -110,8 +182,7 @@ Result<std::string> Acceptance::evaluate(std::uint64_t unit) const {
     if (registered_[i] != kNone) {
       result += verdict_of(report.methods[any_ ? registered_[i] : next++]);
     } else if (i == simulation_) {
-      const std::uint64_t seed = workload_seed(plan_, point, repetition);
-      result += find_miss(*workload, *task_set, plan_.simulation, seed) ? kNotAccepted : kAccepted;
+      result += find_miss(*workload, *task_set, plan_.simulation, seed_of(unit)) ? kNotAccepted : kAccepted;
     } else {
       result += report.verdict == analysis::Verdict::Schedulable ? kAccepted : kNotAccepted;
     }
@@ -119,8 +190,58 @@ Result<std::string> Acceptance::evaluate(std::uint64_t unit) const {
   return result;
 }
 
-bool Acceptance::is_result(std::string_view result) const {
-  return result.size() == plan_.methods.size() && result.find_first_not_of("10-u") == std::string_view::npos;
+Result<void> Acceptance::add(std::uint64_t unit, const std::string &result) {
+  if (unit >= unit_count() || result.size() != plan_.methods.size() ||
+      result.find_first_not_of("10-u") != std::string::npos) {
+    return make_error(fmt::format("the plan has no unit {} with result '{}'", unit, result));
+  }
+  ++sets_[unit % points_.size()];
+  for (std::size_t m = 0; m < result.size(); ++m) {
+    Count &count = counts_[unit % points_.size()][m];
+    if (result[m] == kAccepted || result[m] == kAcceptedUnsound) ++count.accepted;
+    if (result[m] == kAcceptedUnsound) ++count.unsound;
+    if (result[m] == kNotApplicable) ++count.not_applicable;
+  }
+  if (!broken_by(result).empty()) violations_.emplace_back(unit, result);
+  return {};
+}
+
+Result<Results> Acceptance::results() const {
+  Results results;
+  results.name = plan_.name;
+  results.units_are = "workloads";
+  results.factors = factors_;
+  results.factors.push_back({"method", plan_.methods, false});
+  results.counts = {"sets", "accepted", "unsound", "not_applicable"};
+  results.figures = {"accepted_ratio"};
+  results.units = unit_count();
+  for (std::size_t p = 0; p < points_.size(); ++p) {
+    results.done += sets_[p];
+    for (std::size_t m = 0; m < plan_.methods.size() && sets_[p] > 0; ++m) {
+      const Count &count = counts_[p][m];
+      ResultRow row{points_[p], {}, {sets_[p], count.accepted, count.unsound, count.not_applicable}, {std::nullopt}};
+      row.point.push_back(static_cast<std::uint32_t>(m));
+      if (count.not_applicable < sets_[p]) row.figures[0] = proportion(count.accepted, sets_[p]);
+      results.rows.push_back(std::move(row));
+    }
+  }
+  auto violations = violations_;
+  std::sort(violations.begin(), violations.end());
+  if (violations.empty() && simulation_) {
+    results.remarks.push_back({true, "No sound method accepted a workload that missed a deadline in simulation."});
+  }
+  for (const auto &[unit, result] : violations) {
+    if (results.files.size() == kMostReplays) break;
+    const Result<std::string> text = replay(unit, result);
+    if (!text) return tl::unexpected<Diagnostics>(text.error());
+    results.files.emplace_back(fmt::format("violation-{}.yaml", unit), *text);
+    results.remarks.push_back(
+        {false, fmt::format("unit {} ({}) misses a deadline in simulation, although it is accepted by {}: "
+                            "violation-{}.yaml is to be replayed",
+                            unit, describe(factors_, points_[unit % points_.size()]),
+                            fmt::join(broken_by(result), ", "), unit)});
+  }
+  return results;
 }
 
 std::vector<std::string> Acceptance::broken_by(std::string_view result) const {
@@ -133,22 +254,18 @@ std::vector<std::string> Acceptance::broken_by(std::string_view result) const {
 }
 
 Result<std::string> Acceptance::replay(std::uint64_t unit, std::string_view result) const {
-  const AcceptancePoint &point = point_of(unit);
-  const std::uint64_t repetition = unit / points_.size();
-  const Result<Workload> workload = draw_workload(plan_, point, repetition);
+  const Result<Workload> workload = draw(unit);
   if (!workload) return tl::unexpected<Diagnostics>(workload.error());
   const Result<analysis::TaskSet> task_set = analysis::compile(*workload, analysis::platform_of(*workload));
   if (!task_set) return tl::unexpected<Diagnostics>(task_set.error());
-  const std::uint64_t seed = workload_seed(plan_, point, repetition);
-  const std::optional<SeenMiss> miss = find_miss(*workload, *task_set, plan_.simulation, seed);
+  const std::optional<SeenMiss> miss = find_miss(*workload, *task_set, plan_.simulation, seed_of(unit));
   if (!miss) return make_error(fmt::format("unit {}: the miss did not occur again", unit));
   return fmt::format(
-      "# unit {} of '{}': {}, repetition {}; workload seed {}\n"
+      "# unit {} of '{}': {}; workload seed {}\n"
       "# accepted by: {}\n"
-      "# seen: {}\n"
       "# redag simulate THIS_FILE --duration {} --seed {}\n{}",
-      unit, plan_.name, describe(point), repetition, seed, fmt::join(broken_by(result), ", "), miss->what,
-      format_duration(miss->duration), miss->seed, to_yaml(miss->workload));
+      unit, plan_.name, describe(factors_, points_[unit % points_.size()]), seed_of(unit),
+      fmt::join(broken_by(result), ", "), format_duration(miss->duration), miss->seed, to_yaml(miss->workload));
 }
 
 }  // namespace redag::experiment

@@ -6,16 +6,76 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "redag/base/result.hpp"
 #include "redag/model/workload.hpp"
-#include "redag_lab/experiment/acceptance_plan.hpp"
+#include "redag/model/workload_yaml_tree.hpp"
+#include "redag_analysis/core/task_set.hpp"
+#include "redag_lab/experiment/experiment.hpp"
+#include "redag_lab/workload/generate.hpp"
 
 namespace redag::experiment {
+
+struct SimulationEffort {
+  std::uint32_t offsets = 5;  // runs with random offsets, besides the one in which all tasks are released together
+  std::uint32_t periods = 5;  // length of a run, in periods of the slowest task
+
+  friend bool operator==(const SimulationEffort &, const SimulationEffort &) = default;
+};
+
+/// A run with a miss, for `redag simulate` to repeat with this duration and seed.
+struct SeenMiss {
+  Workload workload;
+  Duration duration = 0;
+  std::uint64_t seed = 0;
+};
+
+/// Searches for a miss; every job executes for its wcet. A miss is a response above the deadline, a DAG's instance
+/// above its end-to-end deadline, or a skipped job. `task_set` is `workload` compiled on the platform that it states.
+[[nodiscard]] std::optional<SeenMiss> find_miss(const Workload &workload, const analysis::TaskSet &task_set,
+                                                const SimulationEffort &effort, std::uint64_t seed);
+
+enum class DeadlineKind : std::uint8_t {
+  Implicit,     // D = T
+  Constrained,  // D / T uniform in [0.5, 1], never below C
+};
+[[nodiscard]] const char *to_string(DeadlineKind value);
+
+/// Methods besides those of analysis::methods().
+inline constexpr std::string_view kAnyMethod = "any";                // analysis::analyze(): all sound methods together
+inline constexpr std::string_view kSimulationMethod = "simulation";  // accepts where no miss was seen
+
+struct AcceptancePlan {
+  std::string name = "acceptance";
+  std::uint64_t seed = 1;
+  std::uint32_t sets = 100;  // workloads at each point
+  // The points are all combinations. Utilization is per worker, in millionths.
+  std::vector<std::uint32_t> utilization;
+  std::vector<std::uint32_t> dags = {10};
+  std::vector<std::uint32_t> workers = {4};
+  std::vector<DeadlineKind> deadlines = {DeadlineKind::Implicit};
+  std::vector<PreemptionMode> preemption = {PreemptionMode::None, PreemptionMode::Os};
+  std::vector<std::string> methods = {std::string(kAnyMethod), std::string(kSimulationMethod)};
+  /// Common to all points; a point's own values replace these.
+  lab::GenerateOptions workload;
+  SimulationEffort simulation;
+
+  /// The default plan has single-task DAGs and utilizations from 0.05 to 1 in steps of 0.05.
+  AcceptancePlan();
+};
+/// Reads a plan. Errors: every mistake with its place in `file`.
+[[nodiscard]] Result<AcceptancePlan> read_acceptance_plan(const yaml::Node &root, const std::string &file);
+
+/// Returns the factors of the points: dags, workers, deadlines, preemption, utilization.
+[[nodiscard]] std::vector<Factor> factors_of(const AcceptancePlan &plan);
+/// Returns the generator's options at a point.
+[[nodiscard]] lab::GenerateOptions generate_options(const AcceptancePlan &plan, const Point &point);
 
 /// A unit's result has one character per method, in the plan's order.
 inline constexpr char kAccepted = '1';  // every deadline is shown to be met; simulation: no miss was seen
@@ -23,32 +83,21 @@ inline constexpr char kNotAccepted = '0';
 inline constexpr char kNotApplicable = '-';
 inline constexpr char kAcceptedUnsound = 'u';  // accepted by the paper's equations where their hypotheses do not hold
 
-/// Units are numbered repetition by repetition. An interrupted run has therefore covered all points evenly.
-[[nodiscard]] std::uint64_t unit_count(const AcceptancePlan &plan);
-
-/// Returns the generator's options at a point.
-[[nodiscard]] lab::GenerateOptions generate_options(const AcceptancePlan &plan, const AcceptancePoint &point);
-
-/// Draws workload number `repetition` of a point. Points that differ only in preemption have the same workloads. In a
-/// DAG of several tasks the deadline is end to end. Errors: those of generate().
-[[nodiscard]] Result<Workload> draw_workload(const AcceptancePlan &plan, const AcceptancePoint &point,
-                                             std::uint64_t repetition);
-
-class Acceptance {
+class Acceptance final : public Experiment {
  public:
   /// Requires a plan without mistakes.
   explicit Acceptance(AcceptancePlan plan);
 
-  [[nodiscard]] const AcceptancePlan &plan() const { return plan_; }
-  [[nodiscard]] const std::vector<AcceptancePoint> &points() const { return points_; }
-  [[nodiscard]] const AcceptancePoint &point_of(std::uint64_t unit) const { return points_[unit % points_.size()]; }
+  [[nodiscard]] const std::vector<Point> &points() const { return points_; }
+  [[nodiscard]] std::uint64_t unit_count() const override { return points_.size() * plan_.sets; }
+  [[nodiscard]] Result<std::string> evaluate(std::uint64_t unit) const override;
+  [[nodiscard]] Result<void> add(std::uint64_t unit, const std::string &result) override;
+  /// Replays the first violations, as more files. Errors: those of draw().
+  [[nodiscard]] Result<Results> results() const override;
 
-  /// Evaluates a unit. Any number of threads may call it. Errors: those of draw_workload().
-  [[nodiscard]] Result<std::string> evaluate(std::uint64_t unit) const;
-
-  /// True if the text has the form of a result.
-  [[nodiscard]] bool is_result(std::string_view result) const;
-
+  /// Draws a unit's workload. Units that differ only in preemption have the same workload. In a DAG of several tasks
+  /// the deadline is end to end. Errors: those of generate().
+  [[nodiscard]] Result<Workload> draw(std::uint64_t unit) const;
   /// Returns the methods that accept the unit soundly although the simulation saw a miss. Any such method shows a
   /// mistake in redag.
   [[nodiscard]] std::vector<std::string> broken_by(std::string_view result) const;
@@ -57,14 +106,24 @@ class Acceptance {
   [[nodiscard]] Result<std::string> replay(std::uint64_t unit, std::string_view result) const;
 
  private:
+  /// The counts of one method at one point.
+  struct Count {
+    std::uint64_t accepted = 0;        // includes `unsound`
+    std::uint64_t unsound = 0;         // accepted by an equation whose hypotheses do not hold
+    std::uint64_t not_applicable = 0;  // counted as not accepted
+  };
+
+  [[nodiscard]] std::uint64_t seed_of(std::uint64_t unit) const;
+
   AcceptancePlan plan_;
-  std::vector<AcceptancePoint> points_;
+  std::vector<Factor> factors_;
+  std::vector<Point> points_;
   std::vector<std::size_t> registered_;    // by method of the plan: index into analysis::methods(), or kNone
   std::optional<std::size_t> simulation_;  // index into the plan's methods
   bool any_ = false;
+  std::vector<std::uint64_t> sets_;                                // finished, by point
+  std::vector<std::vector<Count>> counts_;                         // by point and method
+  std::vector<std::pair<std::uint64_t, std::string>> violations_;  // unit and result
 };
-
-/// Describes a point for messages: "10 DAGs, 4 workers, implicit deadlines, preemption none, utilization 0.45".
-[[nodiscard]] std::string describe(const AcceptancePoint &point);
 
 }  // namespace redag::experiment

@@ -11,9 +11,6 @@
 
 #include "redag/model/workload_yaml.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
-#include "redag_lab/experiment/acceptance_results.hpp"
-#include "redag_lab/experiment/line_plot.hpp"
-#include "redag_lab/experiment/seed.hpp"
 
 namespace redag::experiment {
 namespace {
@@ -32,15 +29,15 @@ AcceptancePlan small_plan() {
   return plan;
 }
 
-AcceptanceResults run(const Acceptance &acceptance) {
-  AcceptanceCounter counter(acceptance);
-  for (std::uint64_t unit = 0; unit < unit_count(acceptance.plan()); ++unit) {
+Results run(Acceptance &acceptance) {
+  for (std::uint64_t unit = 0; unit < acceptance.unit_count(); ++unit) {
     const Result<std::string> result = acceptance.evaluate(unit);
     EXPECT_TRUE(result) << to_string(result.error());
-    EXPECT_TRUE(acceptance.is_result(*result)) << *result;
-    EXPECT_TRUE(counter.add(unit, *result));
+    EXPECT_TRUE(acceptance.add(unit, *result)) << *result;
   }
-  return counter.results();
+  const Result<Results> results = acceptance.results();
+  EXPECT_TRUE(results) << to_string(results.error());
+  return *results;
 }
 
 TEST(Seed, DiffersWithEveryCoordinateAndItsPlace) {
@@ -58,12 +55,14 @@ TEST(Acceptance, WorkloadsAreAsThePointSays) {
   plan.workload.min_tasks = 3;
   plan.workload.max_tasks = 6;
   plan.deadlines = {DeadlineKind::Constrained};
-  for (const AcceptancePoint &point : points_of(plan)) {
-    const Result<Workload> workload = draw_workload(plan, point, 0);
+  const Acceptance acceptance(plan);
+  for (std::uint64_t unit = 0; unit < acceptance.points().size(); ++unit) {
+    const lab::GenerateOptions options = generate_options(plan, acceptance.points()[unit]);
+    const Result<Workload> workload = acceptance.draw(unit);
     ASSERT_TRUE(workload);
     EXPECT_EQ(workload->dags.size(), 5U);
-    EXPECT_EQ(workload->platform.workers, point.workers);
-    EXPECT_NEAR(workload->utilization(), point.workers * point.utilization / 1e6, 1e-4);
+    EXPECT_EQ(workload->platform.workers, options.workers);
+    EXPECT_NEAR(workload->utilization(), options.utilization, 1e-4);
     for (const Dag &dag : workload->dags) {
       EXPECT_GT(dag.deadline, 0);
       EXPECT_LE(dag.deadline, dag.tasks.front().period);
@@ -71,24 +70,23 @@ TEST(Acceptance, WorkloadsAreAsThePointSays) {
   }
 }
 
-// A grid can be refined, or a mode added, without changing the workloads of other points.
 TEST(Acceptance, WorkloadsDependOnThePointAlone) {
-  const AcceptancePlan plan = small_plan();
+  AcceptancePlan plan = small_plan();
+  plan.workers = {1};
   AcceptancePlan other = plan;
   other.utilization = {500'000};
   other.preemption = {PreemptionMode::Os};
   other.methods = {"guan"};
   other.sets = 100;
-  AcceptancePoint point = points_of(other).front();
-  EXPECT_EQ(*draw_workload(plan, point, 3), *draw_workload(other, point, 3));
-  EXPECT_NE(*draw_workload(plan, point, 3), *draw_workload(plan, point, 2));
-  Workload preemptive = *draw_workload(plan, point, 3);
-  point.preemption = PreemptionMode::None;
+  const Acceptance some(plan);    // 6 points, 0.5 is number 1, and number 4 with the other mode
+  const Acceptance alone(other);  // 1 point
+  EXPECT_EQ(*some.draw(3 * 6 + 4), *alone.draw(3));
+  EXPECT_NE(*some.draw(2 * 6 + 4), *alone.draw(3));
+  Workload preemptive = *alone.draw(3);
   preemptive.platform.preemption = PreemptionMode::None;
-  EXPECT_EQ(*draw_workload(plan, point, 3), preemptive);
+  EXPECT_EQ(*some.draw(3 * 6 + 1), preemptive);
 }
 
-// A method's verdict on a unit does not depend on the other methods of the plan.
 TEST(Acceptance, OneMethodOrAll) {
   AcceptancePlan all = small_plan();
   all.methods = {"any"};
@@ -117,17 +115,16 @@ TEST(Acceptance, SoundMethodsAcceptNothingThatMisses) {
     plan.workload.max_tasks = max_tasks;
     plan.workload.jitter = max_tasks == 1 ? 0.1 : 0.0;
     for (const analysis::Method &method : analysis::methods()) plan.methods.emplace_back(method.name);
-    const Acceptance acceptance(plan);
-    const AcceptanceResults results = run(acceptance);
-    for (const Violation &violation : results.violations) {
-      ADD_FAILURE() << *acceptance.replay(violation.unit, violation.result);
-    }
+    Acceptance acceptance(plan);
+    const Results results = run(acceptance);
+    for (const auto &[name, text] : results.files) ADD_FAILURE() << text;
+    EXPECT_TRUE(results.all_good());
     // The comparison is meaningful only if both answers occur.
     std::uint64_t accepted = 0;
     std::uint64_t missed = 0;
-    for (const AcceptanceRow &row : results.rows) {
-      accepted += row.cells[0].accepted;
-      missed += row.sets - row.cells[1].accepted;
+    for (const ResultRow &row : results.rows) {
+      if (row.point.back() == 0) accepted += row.counts[1];
+      if (row.point.back() == 1) missed += row.counts[0] - row.counts[1];
     }
     EXPECT_GT(accepted, 100U);
     EXPECT_GT(missed, 100U);
@@ -137,7 +134,7 @@ TEST(Acceptance, SoundMethodsAcceptNothingThatMisses) {
 TEST(Acceptance, ViolationsAreFoundAndReplayed) {
   AcceptancePlan plan = small_plan();
   plan.methods = {"simulation", "rta_preemptive", "paper_rta", "any"};
-  const Acceptance acceptance(plan);
+  Acceptance acceptance(plan);
   EXPECT_THAT(acceptance.broken_by("0100"), ElementsAre("rta_preemptive"));
   EXPECT_THAT(acceptance.broken_by("0-1u"), ElementsAre("paper_rta"));
   EXPECT_THAT(acceptance.broken_by("00u1"), ElementsAre("any"));
@@ -152,6 +149,13 @@ TEST(Acceptance, ViolationsAreFoundAndReplayed) {
   EXPECT_THAT(*text, HasSubstr("# accepted by: rta_preemptive\n"));
   EXPECT_THAT(*text, HasSubstr("# redag simulate THIS_FILE --duration "));
   EXPECT_TRUE(parse_workload(*text, "replay.yaml")) << *text;
+
+  ASSERT_TRUE(acceptance.add(unit, "0100"));
+  const Result<Results> results = acceptance.results();
+  ASSERT_TRUE(results);
+  EXPECT_FALSE(results->all_good());
+  EXPECT_THAT(results->remarks.front().text, HasSubstr("although it is accepted by rta_preemptive"));
+  EXPECT_EQ(results->files.front().second, *text);
 }
 
 TEST(AcceptanceResults, CountsAndCsv) {
@@ -160,46 +164,25 @@ TEST(AcceptanceResults, CountsAndCsv) {
   plan.utilization = {500'000};
   plan.preemption = {PreemptionMode::Os};
   plan.methods = {"any", "guan", "paper_rta"};
-  const Acceptance acceptance(plan);
-  AcceptanceCounter counter(acceptance);
-  ASSERT_TRUE(counter.add(0, "1-u"));
-  EXPECT_FALSE(counter.results().complete());
-  ASSERT_TRUE(counter.add(1, "001"));
-  EXPECT_TRUE(counter.results().complete());
-  EXPECT_EQ(to_csv(acceptance, counter.results()),
-            "dags,workers,deadlines,preemption,utilization,method,sets,accepted,ratio,ratio_low,ratio_high,unsound,"
-            "not_applicable\n"
-            "10,4,implicit,os,0.5,any,2,1,0.500000,0.094531,0.905469,0,0\n"
-            "10,4,implicit,os,0.5,guan,2,0,0.000000,0.000000,0.657620,0,1\n"
-            "10,4,implicit,os,0.5,paper_rta,2,2,1.000000,0.342380,1.000000,1,0\n");
-  EXPECT_FALSE(counter.add(2, "111"));
-  EXPECT_FALSE(counter.add(0, "11"));
-  EXPECT_FALSE(counter.add(0, "11x"));
-}
-
-TEST(AcceptanceResults, PlotHasAPanelForEachModeAndALineForEachMethod) {
-  AcceptancePlan plan = small_plan();
-  plan.workers = {2};
-  plan.methods = {"any", "simulation", "rta_preemptive"};
-  const Acceptance acceptance(plan);
-  const std::string svg = to_svg(acceptance, run(acceptance));
-  EXPECT_THAT(svg, HasSubstr("5 tasks, 2 workers, no preemption"));
-  EXPECT_THAT(svg, HasSubstr("5 tasks, 2 workers, full preemption"));
-  EXPECT_THAT(svg, HasSubstr(">simulation<"));
-  EXPECT_THAT(svg, HasSubstr("rta_preemptive (does not apply)"));
-}
-
-TEST(LinePlot, NamesAreText) {
-  LinePlot plot;
-  plot.title = "a < b & c";
-  plot.lines = {"<x>"};
-  plot.panels.resize(1);
-  plot.panels[0].title = "p";
-  plot.panels[0].series = {{{0.1, 1, 0.9, 1}, {0.2, 0, 0, 0.1}}};
-  const std::string svg = to_svg(plot);
-  EXPECT_THAT(svg, HasSubstr("a &lt; b &amp; c"));
-  EXPECT_THAT(svg, HasSubstr("&lt;x&gt;"));
-  EXPECT_THAT(svg, ::testing::EndsWith("</svg>\n"));
+  Acceptance acceptance(plan);
+  ASSERT_TRUE(acceptance.add(0, "1-u"));
+  EXPECT_EQ(acceptance.results()->done, 1U);
+  ASSERT_TRUE(acceptance.add(1, "0-1"));
+  const Results results = *acceptance.results();
+  EXPECT_EQ(results.done, results.units);
+  EXPECT_EQ(to_csv(results),
+            "dags,workers,deadlines,preemption,utilization,method,sets,accepted,unsound,not_applicable,accepted_ratio,"
+            "accepted_ratio_low,accepted_ratio_high,confidence\n"
+            "10,4,implicit,os,0.5,any,2,1,0,0,0.5,0.0945312,0.905469,0.95\n"
+            "10,4,implicit,os,0.5,guan,2,0,0,2,,,,\n"
+            "10,4,implicit,os,0.5,paper_rta,2,2,1,0,1,0.34238,1,0.95\n");
+  const std::string json = to_json(results, "experiment: acceptance\n");
+  EXPECT_THAT(json, HasSubstr("\"format\":\"redag.experiment/1\""));
+  EXPECT_THAT(json, HasSubstr("\"counts\":[2,0,0,2],\"confidence\":0.0,\"values\":[null]"));
+  EXPECT_THAT(json, HasSubstr("\"values\":[[0.5,0.0945312,0.905469]]"));
+  EXPECT_FALSE(acceptance.add(2, "111"));
+  EXPECT_FALSE(acceptance.add(0, "11"));
+  EXPECT_FALSE(acceptance.add(0, "11x"));
 }
 
 }  // namespace

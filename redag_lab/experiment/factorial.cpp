@@ -4,14 +4,15 @@
 #include "redag_lab/experiment/factorial.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "redag/base/text.hpp"
 #include "redag/model/validate.hpp"
-#include "redag_lab/experiment/seed.hpp"
 
 namespace redag::experiment {
 namespace {
@@ -52,7 +53,10 @@ void scale_deadlines(Workload &workload, double factor) {
   }
 }
 
-double share(std::uint32_t millionths) { return millionths / static_cast<double>(kMillion); }
+// True of a figure that is the largest of all repetitions, not their median.
+bool is_maximum(std::size_t figure) {
+  return figure == kMaxLateness || figure == kPaperMaxLateness || figure == kResponseMax;
+}
 
 }  // namespace
 
@@ -68,30 +72,29 @@ Factorial::Factorial(FactorialPlan plan, Drive drive)
     : plan_(std::move(plan)),
       drive_(std::move(drive)),
       factors_(factors_of(plan_)),
-      points_(experiment::points_of(plan_)) {
-  for (std::size_t p = 0; p < points_.size(); ++p) {
-    if (plan_.executors[points_[p].of(FactorKind::Executor)] == kIdeal) ideals_.push_back(p);
-  }
+      points_(points_of(plan_)),
+      runs_(points_.size()) {}
+
+bool Factorial::takes_turns() const {
+  return std::any_of(plan_.executors.begin(), plan_.executors.end(), [this](const std::string &executor) {
+    const auto [world, name] = place_of(plan_, executor);
+    return world != World::Simulator && name != kIdeal && name != kUnlimited;
+  });
 }
 
-std::optional<std::size_t> Factorial::ideal_of(std::size_t point) const {
-  for (const std::size_t ideal : ideals_) {
-    bool same = true;
-    for (std::size_t f = 0; f + 1 < kFactorCount; ++f) {  // all but the executor
-      const std::uint32_t level = points_[ideal].level[f];
-      const std::uint32_t here = points_[point].level[f];
-      same = same && (level == here || level == kNoLevel);  // the ideal depends neither on bounds nor on policies
-    }
-    if (same) return ideal;
-  }
-  return std::nullopt;
+void Factorial::arrange(std::vector<std::uint64_t> &units) const {
+  const auto turn = [count = points_.size()](std::uint64_t unit) {
+    const std::uint64_t repetition = unit / count;
+    return repetition * count + (unit % count + count - repetition % count) % count;
+  };
+  std::sort(units.begin(), units.end(), [&](std::uint64_t a, std::uint64_t b) { return turn(a) < turn(b); });
 }
 
-Result<Workload> Factorial::workload_of(const FactorialPoint &point, std::uint64_t repetition) const {
-  const std::uint32_t source_level = point.of(FactorKind::Workload);
+Result<Workload> Factorial::workload_of(const Point &point, std::uint64_t repetition) const {
+  const std::uint32_t source_level = point[kWorkload];
   const WorkloadSource &source = plan_.workloads[source_level];
-  const std::uint32_t workers_level = point.of(FactorKind::Workers);
-  const std::uint32_t utilization_level = point.of(FactorKind::Utilization);
+  const std::uint32_t workers_level = point[kWorkers];
+  const std::uint32_t utilization_level = point[kUtilization];
 
   Workload workload = source.workload;
   std::uint32_t workers = source.random ? source.random->workers : workload.platform.workers;
@@ -112,17 +115,17 @@ Result<Workload> Factorial::workload_of(const FactorialPoint &point, std::uint64
     if (!(is > 0)) return make_error("the workload has no execution times to scale to a utilization");
     scale_demand(workload, wanted / is);
   }
-  if (const std::uint32_t level = point.of(FactorKind::DemandScale); level != kNoLevel) {
+  if (const std::uint32_t level = point[kDemandScale]; level != kNoLevel) {
     scale_demand(workload, share(plan_.demand_scale[level]));
   }
-  if (const std::uint32_t level = point.of(FactorKind::DeadlineScale); level != kNoLevel) {
+  if (const std::uint32_t level = point[kDeadlineScale]; level != kNoLevel) {
     scale_deadlines(workload, share(plan_.deadline_scale[level]));
   }
   workload.platform.workers = workers;
-  if (const std::uint32_t level = point.of(FactorKind::Policy); level != kNoLevel) {
+  if (const std::uint32_t level = point[kPolicy]; level != kNoLevel) {
     workload.policy = plan_.policies[level];
   }
-  if (const std::uint32_t level = point.of(FactorKind::MaxActive); level != kNoLevel) {
+  if (const std::uint32_t level = point[kMaxActive]; level != kNoLevel) {
     const std::vector<std::uint32_t> &bounds = plan_.max_active[level];
     for (std::size_t d = 0; d < workload.dags.size(); ++d) {
       workload.dags[d].max_active = bounds.size() == 1 ? bounds[0] : bounds[d];
@@ -132,24 +135,21 @@ Result<Workload> Factorial::workload_of(const FactorialPoint &point, std::uint64
 }
 
 Result<PlannedRun> Factorial::planned_run(std::uint64_t unit) const {
-  const FactorialPoint &point = points_[point_of(unit)];
-  Result<Workload> workload = workload_of(point, repetition_of(unit));
-  if (!workload) {
-    Diagnostics problems = workload.error();
-    problems.front().message += fmt::format(" ({})", describe(plan_, point));
-    return tl::unexpected<Diagnostics>(std::move(problems));
-  }
-  if (Diagnostics mistakes = validate(*workload); has_errors(mistakes)) {
-    std::erase_if(mistakes, [](const Diagnostic &mistake) { return mistake.severity != Severity::Error; });
-    mistakes.front().message += fmt::format(" ({})", describe(plan_, point));
+  const Point &point = points_[unit % points_.size()];
+  const std::uint64_t repetition = unit / points_.size();
+  Result<Workload> workload = workload_of(point, repetition);
+  Diagnostics mistakes = workload ? validate(*workload) : workload.error();
+  std::erase_if(mistakes, [](const Diagnostic &mistake) { return mistake.severity != Severity::Error; });
+  if (!mistakes.empty()) {
+    mistakes.front().message += fmt::format(" ({})", describe(factors_, point));
     return tl::unexpected<Diagnostics>(std::move(mistakes));
   }
   PlannedRun run;
   run.workload = std::move(*workload);
-  ExecutorPlace place = place_of(plan_, plan_.executors[point.of(FactorKind::Executor)]);
+  ExecutorPlace place = place_of(plan_, plan_.executors[point[kExecutor]]);
   run.executor = std::move(place.name);
   run.world = place.world;
-  run.seed = derive_seed(plan_.seed, {point.of(FactorKind::Workload), repetition_of(unit)});
+  run.seed = derive_seed(plan_.seed, {point[kWorkload], repetition});
   run.duration = plan_.duration;
   run.warm_up = plan_.warm_up;
   run.overheads = plan_.overheads;
@@ -173,12 +173,97 @@ Result<std::string> Factorial::evaluate(std::uint64_t unit) const {
   if (!planned) return tl::unexpected<Diagnostics>(planned.error());
   Result<FinishedRun> run = drive_(*planned);
   if (!run) {
-    Diagnostics problems = std::move(run.error());
-    problems.front().message =
-        fmt::format("{} ({})", problems.front().message, describe(plan_, points_[point_of(unit)]));
-    return tl::unexpected<Diagnostics>(std::move(problems));
+    run.error().front().message += fmt::format(" ({})", describe(factors_, points_[unit % points_.size()]));
+    return tl::unexpected<Diagnostics>(std::move(run.error()));
   }
-  return to_line(observe(*run, ObserveOptions{plan_.paper_startup, plan_.quantiles}));
+  return to_line(observe(*run, plan_.paper_startup));
+}
+
+Result<void> Factorial::add(std::uint64_t unit, const std::string &result) {
+  Result<Observation> seen =
+      unit < unit_count() ? parse_observation(result) : Result<Observation>(make_error("the plan has no such unit"));
+  if (!seen) return make_error(fmt::format("unit {}: {}", unit, seen.error().front().message));
+  Runs &runs = runs_[unit % points_.size()];
+  runs.resize(plan_.repetitions);
+  runs[unit / points_.size()] = std::move(*seen);
+  return {};
+}
+
+// Returns the runs of `ideal` with the same jobs and workers; null if the plan has none.
+const Factorial::Runs *Factorial::ideal_of(const Point &point) const {
+  for (std::size_t p = 0; p < points_.size(); ++p) {
+    if (plan_.executors[points_[p][kExecutor]] != kIdeal) continue;
+    bool same = true;
+    for (std::size_t f = 0; f < kExecutor; ++f) {
+      const std::uint32_t level = points_[p][f];  // none of bounds and policies, on which the ideal does not depend
+      same = same && (level == point[f] || level == kNoLevel);
+    }
+    if (same) return &runs_[p];
+  }
+  return nullptr;
+}
+
+ResultRow Factorial::row_of(std::size_t point, std::size_t dag, const Runs *ideal) const {
+  ResultRow row{points_[point], {}, {0, 0, 0}, {}};
+  std::array<std::vector<double>, kFigureCount> values;
+  for (std::size_t r = 0; r < runs_[point].size(); ++r) {
+    if (!runs_[point][r]) continue;
+    const Observation &run = *runs_[point][r];
+    const DagObservation &seen = run.dags[dag];
+    row.labels = {run.world, run.preemption, seen.dag};
+    row.counts[0] += seen.released;
+    row.counts[1] += seen.missed;
+    ++row.counts[2];
+    for (std::size_t f = 0; f < kFigureCount; ++f) {
+      if (seen.figures[f]) values[f].push_back(*seen.figures[f]);
+    }
+    if (ideal == nullptr || r >= ideal->size() || !(*ideal)[r]) continue;
+    values[kExcessMissRatio].push_back(*seen.figures[kMissRatio] - *(*ideal)[r]->dags[dag].figures[kMissRatio]);
+  }
+  for (std::size_t f = 0; f < kFigureCount; ++f) {
+    row.figures.emplace_back();
+    if (values[f].empty()) continue;
+    row.figures[f] = median_of(values[f]);
+    if (!is_maximum(f)) continue;
+    const auto [least, largest] = std::minmax_element(values[f].begin(), values[f].end());
+    row.figures[f] = Interval{*largest, *least, *largest, row.figures[f]->confidence};
+  }
+  return row;
+}
+
+Result<Results> Factorial::results() const {
+  Results results;
+  results.name = plan_.name;
+  results.units_are = "runs";
+  results.factors = factors_;
+  results.labels = {"world", "preemption", "dag"};
+  results.counts = {"released", "missed", "repetitions"};
+  results.figures.assign(kFigureNames.begin(), kFigureNames.end());
+  results.units = unit_count();
+  std::uint64_t violations = 0;
+  std::uint64_t checks = 0;
+  std::uint64_t unenforced = 0;
+  for (std::size_t p = 0; p < points_.size(); ++p) {
+    std::size_t dags = 0;
+    for (const std::optional<Observation> &run : runs_[p]) {
+      if (!run) continue;
+      ++results.done;
+      violations += run->violations;
+      checks += run->checks;
+      if (!run->enforced) ++unenforced;
+      dags = run->dags.size();
+    }
+    const Runs *ideal = ideal_of(points_[p]);
+    for (std::size_t dag = 0; dag < dags; ++dag) results.rows.push_back(row_of(p, dag, ideal));
+  }
+  results.remarks.push_back(
+      {violations == 0,
+       fmt::format("{} runs, {} checks of their traces: {} of the model.", format_count(results.done),
+                   format_count(checks), violations == 0 ? "no violation" : format_count(violations) + " VIOLATIONS")});
+  results.remarks.push_back({unenforced == 0, unenforced == 0 ? "Every max_active bound was kept."
+                                                              : fmt::format("max_active was EXCEEDED in {} runs.",
+                                                                            format_count(unenforced))});
+  return results;
 }
 
 }  // namespace redag::experiment

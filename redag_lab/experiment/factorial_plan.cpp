@@ -1,33 +1,30 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_lab/experiment/factorial_plan.hpp"
-
+// Reads the text form of a plan, which docs/experiments.md describes, and makes its factors.
 #include <algorithm>
 #include <array>
-#include <set>
-#include <string>
-#include <utility>
+#include <filesystem>
+#include <iterator>
 
 #include <fmt/format.h>
 
-#include "redag/base/nearest.hpp"
+#include "redag/model/clusters.hpp"
+#include "redag/model/validate.hpp"
+#include "redag/model/workload_yaml.hpp"
 #include "redag_analysis/executors/executors.hpp"
-#include "redag_lab/experiment/plan_yaml.hpp"
+#include "redag_lab/experiment/factorial.hpp"
+#include "redag_lab/experiment/plan_reader.hpp"
 
 namespace redag::experiment {
 namespace {
 
-constexpr std::uint64_t kMostFactorialUnits = 10'000'000;
-constexpr std::uint64_t kMostCombinations = 1'000'000;
+using yaml::find;
 
-template <class Values, class Text>
-std::vector<std::string> texts(const Values &values, Text text) {
-  std::vector<std::string> result;
-  result.reserve(values.size());
-  for (const auto &value : values) result.emplace_back(text(value));
-  return result;
-}
+constexpr std::array kWorlds = {World::Simulator, World::Threads, World::Ros2};
+// The keys of the factors, by FactorPlace.
+constexpr std::array kFactorKeys = {"workloads",    "policies",       "workers",    "utilization",
+                                    "demand_scale", "deadline_scale", "max_active", "executors"};
 
 std::string bounds_text(const std::vector<std::uint32_t> &bounds) {
   if (std::all_of(bounds.begin(), bounds.end(), [](std::uint32_t bound) { return bound == 0; })) return "unbounded";
@@ -38,8 +35,6 @@ std::string bounds_text(const std::vector<std::uint32_t> &bounds) {
   return text;
 }
 
-constexpr std::array kWorlds = {World::Simulator, World::Threads, World::Ros2};
-
 // Returns the family of an executor: "redag" for "ros2/redag-none".
 std::string_view family_of(std::string_view executor) {
   executor.remove_prefix(executor.find('/') + 1);  // npos + 1 is 0
@@ -49,81 +44,148 @@ std::string_view family_of(std::string_view executor) {
 bool is_redag(std::string_view executor) { return family_of(executor) == "redag"; }
 
 // True if this factor affects this executor.
-bool applies(const FactorialPlan &plan, FactorKind kind, std::string_view executor) {
+bool applies(const FactorialPlan &plan, std::size_t factor, std::string_view executor) {
+  if (factor == kPolicy || factor == kMaxActive) return is_redag(executor);
+  if (factor != kWorkers) return true;
   const std::string_view family = family_of(executor);
-  const executors::ExecutorKind *kind_of = executors::find_executor(family);
-  const bool has_workers = family != kUnlimited && (kind_of == nullptr || !kind_of->single_worker);
-  switch (kind) {
-    case FactorKind::Policy:
-    case FactorKind::MaxActive: return is_redag(executor);
-    // With utilization per worker, the demand depends on the number of workers for every executor.
-    case FactorKind::Workers: return has_workers || !plan.utilization.empty();
-    default: return true;
-  }
+  const executors::ExecutorKind *kind = executors::find_executor(family);
+  const bool has_workers = family != kUnlimited && (kind == nullptr || !kind->single_worker);
+  // With utilization per worker, the demand depends on the number of workers for every executor.
+  return has_workers || !plan.utilization.empty();
 }
 
-class FactorialChecker {
+class FactorialReader : private PlanReader {
  public:
-  FactorialChecker(const FactorialPlan &plan, const ExecutorNames &executors) : plan_(plan), executors_(executors) {}
+  FactorialReader(const Node &root, std::string file, const ExecutorNames &executors)
+      : PlanReader(root, std::move(file)), executors_(executors) {}
 
-  std::vector<PlanMistake> run() {
-    if (!is_plan_name(plan_.name)) say("name", "a name consists of one or more letters, digits, - and _");
-    if (plan_.repetitions == 0) say("repetitions", "repetitions must be at least 1");
-    if (plan_.warm_up >= plan_.duration) say("warm_up", "the warm-up takes the whole duration");
-    if (plan_.workloads.empty()) say("workloads", "no workload is given", "name files, as in workloads: [cart.yaml]");
-    if (plan_.executors.empty())
-      say("executors", "no executor is given", "name executors, as in executors: [ideal, redag, mte]");
-    check_executors();
-    for (const Factor &factor : factors_of(plan_)) {
-      const std::set<std::string> distinct(factor.levels.begin(), factor.levels.end());
-      if (distinct.size() == factor.levels.size()) continue;
-      say(key_of(factor.kind), fmt::format("{} lists a value twice", key_of(factor.kind)));
+  Result<FactorialPlan> run() {
+    std::vector<std::string_view> keys = {"experiment", "name",    "world",     "seed",         "repetitions",
+                                          "duration",   "warm_up", "overheads", "paper_startup"};
+    keys.insert(keys.end(), kFactorKeys.begin(), kFactorKeys.end());
+    if (check_map(root_, "a plan", keys)) {
+      read();
+      if (diagnostics_.empty()) check();
     }
-    check_workloads();
-    if (mistakes_.empty() && has_too_many_combinations()) {
-      say("executors", fmt::format("the plan has more than {} combinations", kMostCombinations),
-          "shorten the plan's lists, or split the plan");
-    }
-    if (mistakes_.empty() && points_of(plan_).size() > kMostFactorialUnits / plan_.repetitions) {
-      say("repetitions", fmt::format("{} combinations with {} repetitions are more than {} runs",
-                                     points_of(plan_).size(), plan_.repetitions, kMostFactorialUnits));
-    }
-    return std::move(mistakes_);
+    if (Diagnostics found = take_diagnostics(); !found.empty()) return tl::unexpected<Diagnostics>(std::move(found));
+    return std::move(plan_);
   }
 
  private:
-  // Counts combinations before creating them: the lists of a small file can have more combinations than fit in memory.
-  [[nodiscard]] bool has_too_many_combinations() const {
-    std::uint64_t combinations = 1;
-    for (const Factor &factor : factors_of(plan_)) {
-      const std::uint64_t levels = std::max<std::size_t>(1, factor.levels.size());
-      if (levels > kMostCombinations / combinations) return true;
-      combinations *= levels;
-    }
-    return false;
+  void read() {
+    take(root_, "name", plan_.name);
+    take(root_, "world", plan_.world, kWorlds);
+    take(root_, "seed", plan_.seed);
+    take(root_, "repetitions", plan_.repetitions);
+    take(root_, "duration", plan_.duration);
+    take(root_, "warm_up", plan_.warm_up);
+    take(root_, "paper_startup", plan_.paper_startup);
+    read_overheads();
+    read_workloads();
+    take_list("policies", plan_.policies, kPolicies);
+    take_list("workers", plan_.workers);
+    take_range("utilization", plan_.utilization);
+    take_range("demand_scale", plan_.demand_scale);
+    take_range("deadline_scale", plan_.deadline_scale);
+    read_max_active();
+    take_list("executors", plan_.executors);
   }
 
-  void say(std::string key, std::string message, std::string hint = {}) {
-    mistakes_.push_back(PlanMistake{std::move(key), std::move(message), std::move(hint)});
+  void read_overheads() {
+    const Node *node = find(root_, "overheads");
+    if (node == nullptr || !check_map(*node, "overheads", {"release", "dispatch", "preempt"})) return;
+    take(*node, "release", plan_.overheads.release);
+    take(*node, "dispatch", plan_.overheads.dispatch);
+    take(*node, "preempt", plan_.overheads.preempt);
   }
 
-  static std::string key_of(FactorKind kind) {
-    switch (kind) {
-      case FactorKind::Workload: return "workloads";
-      case FactorKind::Policy: return "policies";
-      case FactorKind::Executor: return "executors";
-      default: return to_string(kind);
+  void read_workloads() {
+    take_list("workloads", plan_.workloads,
+              [this](const Node &node, std::string_view /*key*/) -> std::optional<WorkloadSource> {
+                if (node.kind == Node::Kind::Scalar) return load(node, {});
+                if (!check_map(node, "a workload", {"name", "file", "random"})) return std::nullopt;
+                std::string name;
+                take(node, "name", name);
+                if (const Node *file = find(node, "file")) return load(*file, std::move(name));
+                if (const Node *random = find(node, "random")) return read_random(*random, std::move(name));
+                error(node, "a workload is a file, or random", "write, for example, {name: cart, file: cart.yaml}");
+                return std::nullopt;
+              });
+  }
+
+  std::optional<WorkloadSource> load(const Node &node, std::string name) {
+    const std::optional<std::string> given = text(node, "file");
+    if (!given) return std::nullopt;
+    const std::filesystem::path path = std::filesystem::path(file_).parent_path() / *given;
+    Result<LoadedWorkload> loaded = load_workload(path);
+    if (!loaded) {
+      error(node, fmt::format("the workload '{}' cannot be used", *given), "its mistakes are listed below");
+      // Their places are in the workload's file. The reader's own error() would place them in the plan.
+      std::copy(loaded.error().begin(), loaded.error().end(), std::back_inserter(diagnostics_));
+      return std::nullopt;
     }
+    if (name.empty()) name = path.stem().string();
+    // The workers of a workload are a factor of the experiment.
+    if (const Result<void> one = refuse_clusters(loaded->workload, "an experiment"); !one) {
+      error(node, one.error().front().message, one.error().front().hint);
+      return std::nullopt;
+    }
+    return WorkloadSource{std::move(name), std::move(loaded->workload), std::nullopt};
+  }
+
+  std::optional<WorkloadSource> read_random(const Node &node, std::string name) {
+    if (!check_map(node, "random", generation_keys({"dags", "workers", "bcet", "deadline"}))) return std::nullopt;
+    WorkloadSource source{std::move(name), {}, lab::GenerateOptions{}};
+    take(node, "dags", source.random->dags);
+    take(node, "workers", source.random->workers);
+    take(node, "bcet", source.random->bcet_min);
+    source.random->bcet_max = source.random->bcet_min;
+    take(node, "deadline", source.random->deadline_min);
+    take_generation(node, *source.random);
+    return source;
+  }
+
+  // Reads unbounded, 3 (all DAGs), or [2, 3] (by DAG).
+  void read_max_active() {
+    const Node *node = find(root_, "max_active");
+    if (node == nullptr) return;
+    if (node->kind != Node::Kind::Sequence) {
+      wrong_type(*node, "max_active", "a list of bounds, such as unbounded, 3 or [2, 3]");
+      return;
+    }
+    for (const Node &item : node->children) {
+      if (item.kind == Node::Kind::Sequence) {
+        std::vector<std::uint32_t> bounds;
+        for (const Node &part : item.children) {
+          if (const auto bound = integer<std::uint32_t>(part, "max_active", 0, kMaxBound)) bounds.push_back(*bound);
+        }
+        plan_.max_active.push_back(std::move(bounds));
+      } else if (item.text == "unbounded") {
+        plan_.max_active.push_back({0});
+      } else if (const auto bound = integer<std::uint32_t>(item, "max_active", 1, kMaxBound)) {
+        plan_.max_active.push_back({*bound});
+      }
+    }
+  }
+
+  void check() {
+    check_name("name", plan_.name);
+    if (plan_.warm_up >= plan_.duration) mistake("warm_up", "the warm-up takes the whole duration");
+    if (plan_.workloads.empty()) {
+      mistake("workloads", "no workload is given", "name files, as in workloads: [cart.yaml]");
+    }
+    if (plan_.executors.empty()) {
+      mistake("executors", "no executor is given", "name executors, as in executors: [ideal, redag, mte]");
+    }
+    check_executors();
+    check_workloads();
+    std::vector<Factor> factors = factors_of(plan_);
+    for (std::size_t f = 0; f < factors.size(); ++f) factors[f].name = kFactorKeys[f];
+    check_grid(factors, plan_.repetitions);
   }
 
   void check_executors() {
     for (const std::string &written : plan_.executors) check_executor(written);
-    const bool any_bounded = std::any_of(plan_.executors.begin(), plan_.executors.end(),
-                                         [](const std::string &name) { return is_redag(name); });
-    for (const auto &[key, given] : {std::pair<const char *, bool>{"policies", !plan_.policies.empty()},
-                                     {"max_active", !plan_.max_active.empty()}}) {
-      if (given && !any_bounded) say(key, fmt::format("{} have no meaning for the executors of this plan", key));
-    }
   }
 
   void check_executor(const std::string &written) {
@@ -132,35 +194,32 @@ class FactorialChecker {
     std::vector<std::string_view> known(of_world.begin(), of_world.end());
     if (name == written) known.insert(known.begin(), {kIdeal, kUnlimited});
     if (std::find(known.begin(), known.end(), name) == known.end()) {
-      const std::string_view near = nearest(name, known);
-      say("executors", fmt::format("there is no executor '{}'", written),
-          near.empty() ? fmt::format("known: {}", fmt::join(known, ", ")) : fmt::format("did you mean '{}'?", near));
+      mistake("executors", fmt::format("there is no executor '{}'", written),
+              did_you_mean(name, known, fmt::format("known: {}", fmt::join(known, ", "))));
     } else if (world == World::Simulator && name.ends_with("-fifo")) {
-      say("executors", fmt::format("the simulator has no threads to make real-time: '{}' is the same as '{}' there",
-                                   name, name.substr(0, name.find('-'))));
+      mistake("executors", fmt::format("the simulator has no threads to make real-time: '{}' is the same as '{}' there",
+                                       name, name.substr(0, name.find('-'))));
     }
   }
 
   void check_workloads() {
     for (const WorkloadSource &source : plan_.workloads) {
-      if (!is_plan_name(source.name)) {
-        say("workloads", fmt::format("'{}': the name of a workload consists of letters, digits, - and _", source.name));
-      }
+      check_name("workloads", source.name);
       if (source.random && plan_.utilization.empty()) {
-        say("workloads", fmt::format("'{}': random workloads need a utilization", source.name));
+        mistake("workloads", fmt::format("'{}': random workloads need a utilization", source.name));
       }
       const std::size_t dags = source.random ? source.random->dags : source.workload.dags.size();
       for (const std::vector<std::uint32_t> &bounds : plan_.max_active) {
         if (bounds.size() <= 1 || bounds.size() == dags) continue;
-        say("max_active", fmt::format("{} bounds are given, but '{}' has {} DAGs", bounds.size(), source.name, dags));
+        mistake("max_active",
+                fmt::format("{} bounds are given, but '{}' has {} DAGs", bounds.size(), source.name, dags));
         break;
       }
     }
   }
 
-  const FactorialPlan &plan_;
   const ExecutorNames &executors_;
-  std::vector<PlanMistake> mistakes_;
+  FactorialPlan plan_;
 };
 
 }  // namespace
@@ -184,83 +243,30 @@ ExecutorPlace place_of(const FactorialPlan &plan, const std::string &executor) {
   return {plan.world, executor};
 }
 
-bool needs_machine(const FactorialPlan &plan) {
-  return std::any_of(plan.executors.begin(), plan.executors.end(), [&](const std::string &executor) {
-    const auto [world, name] = place_of(plan, executor);
-    return world != World::Simulator && name != kIdeal && name != kUnlimited;
-  });
-}
-
-const char *to_string(FactorKind kind) {
-  switch (kind) {
-    case FactorKind::Workload: return "workload";
-    case FactorKind::Policy: return "policy";
-    case FactorKind::Workers: return "workers";
-    case FactorKind::Utilization: return "utilization";
-    case FactorKind::DemandScale: return "demand_scale";
-    case FactorKind::DeadlineScale: return "deadline_scale";
-    case FactorKind::MaxActive: return "max_active";
-    case FactorKind::Executor: return "executor";
-  }
-  return "?";
-}
-
 std::vector<Factor> factors_of(const FactorialPlan &plan) {
-  const auto share = [](std::uint32_t value) { return fmt::format("{}", value / static_cast<double>(kMillion)); };
+  const auto fraction = [](std::uint32_t value) { return fmt::format("{}", share(value)); };
   const auto number = [](std::uint32_t value) { return std::to_string(value); };
   return {
-      {FactorKind::Workload, texts(plan.workloads, [](const WorkloadSource &source) { return source.name; }), false},
-      {FactorKind::Policy, texts(plan.policies, [](PolicyKind policy) { return to_string(policy); }), false},
-      {FactorKind::Workers, texts(plan.workers, number), true},
-      {FactorKind::Utilization, texts(plan.utilization, share), true},
-      {FactorKind::DemandScale, texts(plan.demand_scale, share), true},
-      {FactorKind::DeadlineScale, texts(plan.deadline_scale, share), true},
-      {FactorKind::MaxActive, texts(plan.max_active, bounds_text), false},
-      {FactorKind::Executor, plan.executors, false},
+      {"workload", texts(plan.workloads, [](const WorkloadSource &source) { return source.name; }), false},
+      {"policy", texts(plan.policies, [](PolicyKind policy) { return to_string(policy); }), false},
+      {"workers", texts(plan.workers, number), true},
+      {"utilization", texts(plan.utilization, fraction), true},
+      {"demand_scale", texts(plan.demand_scale, fraction), true},
+      {"deadline_scale", texts(plan.deadline_scale, fraction), true},
+      {"max_active", texts(plan.max_active, bounds_text), false},
+      {"executor", plan.executors, false},
   };
 }
 
-std::vector<FactorialPoint> points_of(const FactorialPlan &plan) {
-  const std::vector<Factor> factors = factors_of(plan);
-  std::vector<FactorialPoint> points;
-  FactorialPoint point{std::vector<std::uint32_t>(kFactorCount, kNoLevel)};
-  for (std::size_t f = 0; f < kFactorCount; ++f) {
-    if (!factors[f].levels.empty()) point.level[f] = 0;
-  }
-  while (true) {
-    // Combinations that differ only in factors without effect on the executor are equal; the first one represents them.
-    FactorialPoint clean = point;
-    bool is_first = true;
-    for (std::size_t f = 0; f < kFactorCount; ++f) {
-      if (clean.level[f] == kNoLevel || applies(plan, factors[f].kind, plan.executors[point.level.back()])) continue;
-      is_first = is_first && clean.level[f] == 0;
-      clean.level[f] = kNoLevel;
-    }
-    if (is_first) points.push_back(std::move(clean));
-    std::size_t f = kFactorCount;  // advances to the next combination; the last factor changes fastest
-    while (f > 0) {
-      --f;
-      if (point.level[f] == kNoLevel) continue;
-      if (++point.level[f] < factors[f].levels.size()) break;
-      point.level[f] = 0;
-      if (f == 0) return points;
-    }
-  }
+std::vector<Point> points_of(const FactorialPlan &plan) {
+  return points_of(factors_of(plan), [&plan](std::size_t factor, const Point &point) {
+    return applies(plan, factor, plan.executors[point[kExecutor]]);
+  });
 }
 
-std::string describe(const FactorialPlan &plan, const FactorialPoint &point) {
-  const std::vector<Factor> factors = factors_of(plan);
-  std::string text;
-  for (const Factor &factor : factors) {
-    const std::uint32_t level = point.of(factor.kind);
-    if (level == kNoLevel) continue;
-    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", to_string(factor.kind), factor.levels[level]);
-  }
-  return text;
-}
-
-std::vector<PlanMistake> find_mistakes(const FactorialPlan &plan, const ExecutorNames &executors) {
-  return FactorialChecker(plan, executors).run();
+Result<FactorialPlan> read_factorial_plan(const yaml::Node &root, const std::string &file,
+                                          const ExecutorNames &executors) {
+  return FactorialReader(root, file, executors).run();
 }
 
 }  // namespace redag::experiment

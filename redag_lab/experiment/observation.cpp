@@ -4,17 +4,13 @@
 #include "redag_lab/experiment/observation.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <numeric>
-#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "redag/trace/worker_count.hpp"
-#include "redag_analysis/metrics/distribution.hpp"
 #include "redag_analysis/metrics/jobs.hpp"
 #include "redag_analysis/metrics/paper_accounting.hpp"
 
@@ -22,42 +18,9 @@ namespace redag::experiment {
 namespace {
 
 using Json = nlohmann::ordered_json;
-using metrics::JobRecord;
 
-constexpr std::array<const char *, kMeasureCount> kQuantityNames = {
-    "released",           "finished",     "late",         "dropped",       "aborted",        "missed",
-    "deferred",           "preemptions",  "max_lateness", "response_mean", "response_p50",   "response_p95",
-    "response_p99",       "response_max", "peak_active",  "paper_jobs",    "paper_late",     "paper_max_lateness",
-    "paper_startup_late", "work",         "answered",     "answers_due",   "end_to_end_late"};
-
-// Returns quantiles of the end-to-end responses by sink. With several sinks, each quantile is the largest of the sinks.
-std::vector<Duration> quantiles_of(const trace::RunInfo &info, const std::vector<JobRecord> &jobs,
-                                   const metrics::EndToEnd &end_to_end) {
-  std::vector<Duration> quantiles;
-  for (const metrics::SinkSummary &sink : end_to_end.sinks) {
-    std::vector<Duration> responses;
-    for (const JobRecord &job : jobs) {
-      if (job.task != sink.task || job.outcome != metrics::JobOutcome::Finished) continue;
-      if (job.release >= info.start + info.warm_up) responses.push_back(job.finish - job.origin);
-    }
-    if (responses.empty()) continue;
-    std::sort(responses.begin(), responses.end());
-    quantiles.resize(kQuantiles.size(), std::numeric_limits<Duration>::min());
-    for (std::size_t q = 0; q < kQuantiles.size(); ++q) {
-      quantiles[q] = std::max(quantiles[q], metrics::percentile(responses, kQuantiles[q]));
-    }
-  }
-  return quantiles;
-}
-
-// Returns the sink with the smallest share of answers; null if no answer was due.
-const metrics::SinkSummary *rarest(const metrics::EndToEnd &end_to_end) {
-  const metrics::SinkSummary *found = nullptr;
-  for (const metrics::SinkSummary &sink : end_to_end.sinks) {
-    if (sink.due == 0) continue;
-    if (found == nullptr || sink.response.count * found->due < found->response.count * sink.due) found = &sink;
-  }
-  return found;
+double ratio(std::uint64_t part, std::uint64_t whole) {
+  return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
 }
 
 bool has_measured_end(JobEventKind kind) { return kind == JobEventKind::Finished || kind == JobEventKind::Aborted; }
@@ -95,103 +58,73 @@ std::vector<Duration> work_of(const trace::Trace &trace, std::size_t tasks) {
 
 }  // namespace
 
-const char *to_string(Measure measure) { return kQuantityNames[static_cast<std::size_t>(measure)]; }
-
-Observation observe(const FinishedRun &run, const ObserveOptions &options) {
+Observation observe(const FinishedRun &run, Duration paper_startup) {
   const trace::RunInfo &info = run.trace.info;
-  const metrics::Summary &summary = run.summary;
-  const std::vector<JobRecord> jobs = metrics::fold_jobs(info.workload, run.trace.events);
+  const std::vector<metrics::JobRecord> jobs = metrics::fold_jobs(info.workload, run.trace.events);
   const std::vector<TaskRef> refs = flatten(info.workload);
   const std::vector<Duration> work = work_of(run.trace, refs.size());
+  const auto counted = static_cast<double>(info.end - info.start - info.warm_up);
 
-  const auto describe = [&](const std::string &name, const metrics::JobCounts &stats, std::uint32_t peak,
-                            std::optional<DagId> dag, const metrics::EndToEnd &end_to_end) {
-    DagObservation row;
-    row.dag = name;
-    const auto set = [&row](Measure measure, auto value) {
-      row.values[static_cast<std::size_t>(measure)] = static_cast<std::int64_t>(value);
-    };
-    set(Measure::Released, stats.released);
-    set(Measure::Finished, stats.finished);
-    set(Measure::Late, stats.late);
-    set(Measure::Dropped, stats.skipped);
-    set(Measure::Aborted, stats.aborted);
-    set(Measure::Missed, stats.missed());
-    set(Measure::Deferred, stats.deferred);
-    set(Measure::Preemptions, stats.preemptions);
-    set(Measure::MaxLateness, stats.max_lateness.value_or(kNotMeasured));
-    const metrics::Distribution &response = end_to_end.response;
-    const auto set_response = [&](Measure measure, std::int64_t value) {
-      set(measure, response.count > 0 ? value : kNotMeasured);
-    };
-    set_response(Measure::ResponseMean, std::llround(response.mean));
-    set_response(Measure::ResponseP50, response.p50);
-    set_response(Measure::ResponseP95, response.p95);
-    set_response(Measure::ResponseP99, response.p99);
-    set_response(Measure::ResponseMax, response.max);
-    const metrics::SinkSummary *sink = rarest(end_to_end);
-    set(Measure::Answered, sink == nullptr ? 0 : sink->response.count);
-    set(Measure::AnswersDue, sink == nullptr ? 0 : sink->due);
-    set(Measure::EndToEndLate, end_to_end.late);
-    set(Measure::PeakActive, peak);
+  const auto describe = [&](const std::string &name, const metrics::JobCounts &stats, std::optional<DagId> dag,
+                            const metrics::Distribution &response) {
+    DagObservation row{name, stats.released, stats.missed(), {}};
+    row.figures[kMissRatio] = ratio(stats.missed(), stats.released);
+    row.figures[kDropRatio] = ratio(stats.skipped, stats.released);
+    row.figures[kMaxLateness] = stats.max_lateness;
+    if (response.count > 0) {
+      row.figures[kResponseP50] = response.p50;
+      row.figures[kResponseP95] = response.p95;
+      row.figures[kResponseP99] = response.p99;
+      row.figures[kResponseMax] = response.max;
+    }
     const metrics::PaperCount paper = metrics::paper_count(info.workload, jobs, 0, dag);
-    set(Measure::PaperJobs, paper.jobs);
-    set(Measure::PaperLate, paper.late);
-    set(Measure::PaperMaxLateness, paper.max_lateness.value_or(kNotMeasured));
-    set(Measure::PaperStartupLate, metrics::paper_count(info.workload, jobs, options.paper_startup, dag).late);
+    row.figures[kPaperMissRatio] = ratio(paper.late, paper.jobs);
+    row.figures[kPaperStartupMissRatio] =
+        ratio(metrics::paper_count(info.workload, jobs, paper_startup, dag).late, paper.jobs);
+    row.figures[kPaperMaxLateness] = paper.max_lateness;
     Duration had_workers = 0;
     for (const TaskRef &ref : refs) had_workers += !dag || ref.dag == *dag ? work[ref.id.value] : 0;
-    set(Measure::Work, had_workers);
-    if (options.quantiles) row.quantiles = quantiles_of(info, jobs, end_to_end);
+    row.figures[kFinishedPerSecond] = static_cast<double>(stats.finished) * kSecond / counted;
+    row.figures[kWork] = static_cast<double>(had_workers) / counted;
     return row;
   };
 
   Observation seen;
-  seen.seed = info.seed;
   seen.world = trace::to_string(info.driver);
   seen.preemption = info.preemption;
-  seen.workers = trace::worker_count(info);
   seen.violations = run.check.violation_count;
-  seen.check_count =
-      std::accumulate(run.check.checks_by_rule.begin(), run.check.checks_by_rule.end(), std::uint64_t{0});
-  seen.enforced = summary.all_enforced;
-  std::uint32_t peak = 0;
-  for (std::size_t d = 0; d < summary.dags.size(); ++d) {
-    const metrics::DagSummary &dag = summary.dags[d];
-    seen.dags.push_back(describe(dag.name, dag.jobs, dag.peak_active, DagId(d), dag.end_to_end));
-    peak = std::max(peak, dag.peak_active);
+  seen.checks = std::accumulate(run.check.checks_by_rule.begin(), run.check.checks_by_rule.end(), std::uint64_t{0});
+  seen.enforced = run.summary.all_enforced;
+  for (std::size_t d = 0; d < run.summary.dags.size(); ++d) {
+    const metrics::DagSummary &dag = run.summary.dags[d];
+    seen.dags.push_back(describe(dag.name, dag.jobs, DagId(d), dag.end_to_end.response));
   }
-  seen.dags.push_back(describe("total", summary.total, peak, std::nullopt, {}));
+  seen.dags.push_back(describe("total", run.summary.total, std::nullopt, {}));
   return seen;
 }
 
 std::string to_line(const Observation &observation) {
   Json dags = Json::array();
-  for (const DagObservation &dag : observation.dags) dags.push_back(Json::array({dag.dag, dag.values, dag.quantiles}));
-  return Json::array({observation.seed, observation.world, observation.preemption, observation.workers,
-                      observation.violations, observation.enforced, observation.check_count, std::move(dags)})
+  for (const DagObservation &dag : observation.dags) {
+    Json figures = Json::array();
+    for (const std::optional<double> &figure : dag.figures) figures.push_back(figure ? Json(*figure) : Json());
+    dags.push_back(Json::array({dag.dag, dag.released, dag.missed, std::move(figures)}));
+  }
+  return Json::array({observation.world, observation.preemption, observation.violations, observation.checks,
+                      observation.enforced, std::move(dags)})
       .dump();
 }
 
 Result<Observation> parse_observation(std::string_view line) {
   try {
     const Json json = Json::parse(line);
-    Observation seen;
-    seen.seed = json.at(0).get<std::uint64_t>();
-    seen.world = json.at(1).get<std::string>();
-    seen.preemption = json.at(2).get<std::string>();
-    seen.workers = json.at(3).get<std::uint32_t>();
-    seen.violations = json.at(4).get<std::uint64_t>();
-    seen.enforced = json.at(5).get<bool>();
-    seen.check_count = json.at(6).get<std::uint64_t>();
-    for (const Json &dag : json.at(7)) {
-      DagObservation row;
-      row.dag = dag.at(0).get<std::string>();
-      if (dag.at(1).size() != kMeasureCount) return make_error("an observation has other measures than expected");
-      row.values = dag.at(1).get<std::array<std::int64_t, kMeasureCount>>();
-      row.quantiles = dag.at(2).get<std::vector<Duration>>();
-      if (!row.quantiles.empty() && row.quantiles.size() != kQuantiles.size()) {
-        return make_error("an observation has other quantiles than expected");
+    Observation seen{json.at(0).get<std::string>(),   json.at(1).get<std::string>(), json.at(2).get<std::uint64_t>(),
+                     json.at(3).get<std::uint64_t>(), json.at(4).get<bool>(),        {}};
+    for (const Json &dag : json.at(5)) {
+      DagObservation row{
+          dag.at(0).get<std::string>(), dag.at(1).get<std::uint64_t>(), dag.at(2).get<std::uint64_t>(), {}};
+      for (std::size_t f = 0; f < kFigureCount; ++f) {
+        if (const Json &figure = dag.at(3).at(f); !figure.is_null()) row.figures[f] = figure.get<double>();
       }
       seen.dags.push_back(std::move(row));
     }

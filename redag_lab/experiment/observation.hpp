@@ -2,12 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The figures kept of one run of the experiment "factorial", by DAG and in total. Plain values with a text form of one
-// line, for units.db.
+// line, for the store of units.
 #pragma once
 
 #include <array>
 #include <cstdint>
-#include <limits>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -19,62 +19,53 @@
 
 namespace redag::experiment {
 
-/// Counts and measurements of one run; durations are in ns. The names are those of docs/experiments.md. The response of
-/// a DAG is end to end; with several sinks each figure is that of the worst sink. The total has no response.
-enum class Measure : std::uint8_t {
-  Released,
-  Finished,
-  Late,
-  Dropped,  // skipped releases
-  Aborted,
-  Missed,  // late, dropped or aborted (metrics::JobCounts::missed)
-  Deferred,
-  Preemptions,
-  MaxLateness,
-  ResponseMean,
-  ResponseP50,
-  ResponseP95,
-  ResponseP99,
-  ResponseMax,
-  PeakActive,
-  // The paper's accounting (metrics/paper_accounting.hpp): with the true epoch, and with an epoch before start-up.
-  PaperJobs,
-  PaperLate,
-  PaperMaxLateness,
-  PaperStartupLate,
-  Work,  // time that jobs had a worker, from the end of the warm-up to the end of the run
-  // Of the sink with the smallest share of answers: its finished jobs, and the number that its sources' releases
-  // require.
-  Answered,
-  AnswersDue,
-  EndToEndLate,  // beyond the DAG's end-to-end deadline, over all sinks
+/// The response of a DAG is end to end; with several sinks each figure is that of the worst sink. The total has no
+/// response. docs/experiments.md describes the figures, which have these names.
+enum Figure : std::uint8_t {
+  kMissRatio,  // late, dropped or aborted jobs, per release
+  kDropRatio,
+  kExcessMissRatio,        // above the ideal on the same jobs; not of a run alone
+  kPaperMissRatio,         // the paper's accounting (metrics/paper_accounting.hpp): with the true epoch,
+  kPaperStartupMissRatio,  // and with an epoch before start-up
+  kMaxLateness,
+  kPaperMaxLateness,
+  kResponseP50,
+  kResponseP95,
+  kResponseP99,
+  kResponseMax,
+  kFinishedPerSecond,  // jobs per second of counted time
+  kWork,               // time with a worker, per counted time: processors in use
 };
-inline constexpr std::size_t kMeasureCount = 23;
-/// Marks a value that could not be measured: the response of a DAG that never answered, or the lateness without a job.
-inline constexpr std::int64_t kNotMeasured = std::numeric_limits<std::int64_t>::min();
-[[nodiscard]] const char *to_string(Measure measure);
-
-/// Percentages of the quantiles of end-to-end responses, kept where the plan asks for them.
-inline constexpr std::array<double, 25> kQuantiles = {0.5, 1,  2,  5,  10, 15, 20, 25, 30, 35, 40, 45, 50,
-                                                      55,  60, 65, 70, 75, 80, 85, 90, 95, 98, 99, 100};
+inline constexpr std::array kFigureNames = {"miss_ratio",
+                                            "drop_ratio",
+                                            "excess_miss_ratio",
+                                            "paper_miss_ratio",
+                                            "paper_startup_miss_ratio",
+                                            "max_lateness_ns",
+                                            "paper_max_lateness_ns",
+                                            "response_p50_ns",
+                                            "response_p95_ns",
+                                            "response_p99_ns",
+                                            "response_max_ns",
+                                            "finished_per_s",
+                                            "work"};
+inline constexpr std::size_t kFigureCount = kFigureNames.size();
 
 struct DagObservation {
   std::string dag;  // "total" for all DAGs together
-  std::array<std::int64_t, kMeasureCount> values{};
-  std::vector<Duration> quantiles;  // by kQuantiles; empty if not kept, or if no job finished
+  std::uint64_t released = 0;
+  std::uint64_t missed = 0;
+  std::array<std::optional<double>, kFigureCount> figures;  // nothing where there is nothing to measure
 
-  [[nodiscard]] std::int64_t of(Measure measure) const { return values[static_cast<std::size_t>(measure)]; }
   friend bool operator==(const DagObservation &, const DagObservation &) = default;
 };
 
 struct Observation {
-  std::uint64_t seed = 0;
-  std::string world;       // of this run; ideal executors are always simulated
-  std::string preemption;  // the mode that ran
-  std::uint32_t workers = 0;
+  std::string world;                 // of this run; ideal executors are always simulated
+  std::string preemption;            // the mode that ran
   std::uint64_t violations = 0;      // found by the trace checker
+  std::uint64_t checks = 0;          // made by the trace checker
   bool enforced = true;              // no DAG ever exceeded its max_active
-  std::uint64_t check_count = 0;     // made by the trace checker
   std::vector<DagObservation> dags;  // the last is the total
 
   friend bool operator==(const Observation &, const Observation &) = default;
@@ -87,11 +78,7 @@ struct FinishedRun {
   metrics::CheckReport check;
 };
 
-struct ObserveOptions {
-  Duration paper_startup = 0;
-  bool quantiles = false;
-};
-[[nodiscard]] Observation observe(const FinishedRun &run, const ObserveOptions &options);
+[[nodiscard]] Observation observe(const FinishedRun &run, Duration paper_startup);
 
 /// Returns the observation as one line, from which parse_observation() restores it. Parsing fails on any other form.
 [[nodiscard]] std::string to_line(const Observation &observation);

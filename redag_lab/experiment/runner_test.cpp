@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_lab/experiment/runner.hpp"
+#include "redag_lab/experiment/unit_store.hpp"
 
 #include <gtest/gtest.h>
 
@@ -25,17 +25,19 @@ Result<std::string> slow_at_first(std::uint64_t unit) {
   return std::to_string(unit * unit);
 }
 
-TEST(Runner, HandsOverInOrderForAnyNumberOfJobs) {
+const std::atomic<bool> kNever{false};
+
+TEST(Runner, HandsOverEveryUnitOnceForAnyNumberOfJobs) {
   for (const std::uint32_t jobs : {1U, 2U, 5U}) {
-    std::vector<std::uint64_t> seen;
-    const auto done = run_units(units_of(first(300)), {jobs, nullptr}, slow_at_first,
+    std::set<std::uint64_t> seen;
+    const auto done = run_units(first(300), jobs, kNever, slow_at_first,
                                 [&](std::uint64_t unit, const std::string &result) -> Result<void> {
                                   EXPECT_EQ(result, std::to_string(unit * unit));
-                                  seen.push_back(unit);
+                                  EXPECT_TRUE(seen.insert(unit).second);
                                   return {};
                                 });
-    EXPECT_EQ(done, 300U);
-    EXPECT_EQ(seen, first(300)) << jobs;
+    EXPECT_TRUE(done);
+    EXPECT_EQ(seen.size(), 300U) << jobs;
   }
 }
 
@@ -49,31 +51,28 @@ TEST(Runner, EvaluatesOnSeveralThreads) {
     if (inside >= 2) met = true;
     return "";
   };
-  EXPECT_TRUE(run_units(units_of(first(2)), {2, nullptr}, meet, [](auto, const auto &) { return Result<void>{}; }));
+  EXPECT_TRUE(run_units(first(2), 2, kNever, meet, [](auto, const auto &) { return Result<void>{}; }));
   EXPECT_TRUE(met);
 }
 
-TEST(Runner, StopKeepsAPrefix) {
+TEST(Runner, StopLeavesOutWhatHasNotBegun) {
   std::atomic<bool> stop{false};
   std::uint64_t accepted = 0;
-  const auto done =
-      run_units(units_of(first(100'000)), {2, &stop}, slow_at_first, [&](std::uint64_t unit, const std::string &) {
-        EXPECT_EQ(unit, accepted++);
-        if (unit == 10) stop = true;
-        return Result<void>{};
-      });
-  ASSERT_TRUE(done);
-  EXPECT_EQ(*done, accepted);
-  EXPECT_GT(*done, 10U);
-  EXPECT_LT(*done, 100'000U);
+  const auto done = run_units(first(100'000), 2, stop, slow_at_first, [&](std::uint64_t, const std::string &) {
+    if (++accepted == 10) stop = true;
+    return Result<void>{};
+  });
+  EXPECT_TRUE(done);
+  EXPECT_GE(accepted, 10U);
+  EXPECT_LE(accepted, 11U);
 }
 
-TEST(Runner, FirstErrorInOrderEndsIt) {
+TEST(Runner, AnErrorEndsIt) {
   std::uint64_t accepted = 0;
   const auto done = run_units(
-      units_of(first(1000)), {3, nullptr},
+      first(1000), 3, kNever,
       [](std::uint64_t unit) -> Result<std::string> {
-        if (unit >= 50 && unit % 2 == 0) return make_error("unit " + std::to_string(unit));
+        if (unit == 50) return make_error("unit 50");
         return "";
       },
       [&](std::uint64_t, const std::string &) {
@@ -82,11 +81,11 @@ TEST(Runner, FirstErrorInOrderEndsIt) {
       });
   ASSERT_FALSE(done);
   EXPECT_EQ(done.error().front().message, "unit 50");
-  EXPECT_EQ(accepted, 50U);
+  EXPECT_LT(accepted, 1000U);
 }
 
 TEST(Runner, WhatCannotBeKeptEndsIt) {
-  const auto done = run_units(units_of(first(1000)), {2, nullptr}, slow_at_first,
+  const auto done = run_units(first(1000), 2, kNever, slow_at_first,
                               [](std::uint64_t, const std::string &) -> Result<void> { return make_error("full"); });
   ASSERT_FALSE(done);
   EXPECT_EQ(done.error().size(), 1U);

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_lab/experiment/simulated_misses.hpp"
+#include "redag_lab/experiment/acceptance.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,8 +10,6 @@
 
 namespace redag::experiment {
 namespace {
-
-using ::testing::HasSubstr;
 
 std::optional<SeenMiss> miss_of(const std::string &text, SimulationEffort effort = {}) {
   const Result<LoadedWorkload> loaded = parse_workload(text, "test.yaml");
@@ -36,7 +34,6 @@ TEST(SimulatedMisses, LateJob) {
       miss_of(workload("  - {name: a, tasks: [{name: t, wcet: 5ms, period: 10ms}]}\n"
                        "  - {name: b, tasks: [{name: t, wcet: 6ms, period: 20ms, deadline: 15ms}]}\n"));
   ASSERT_TRUE(miss);
-  EXPECT_EQ(miss->what, "b.t: job 0 had a response time of at least 16ms; its deadline is 15ms");
   EXPECT_EQ(miss->duration, 100 * kMillisecond);
 }
 
@@ -52,7 +49,6 @@ TEST(SimulatedMisses, SkippedJob) {
                                      "none"),
                             {5, 5});
   ASSERT_TRUE(miss);
-  EXPECT_THAT(miss->what, HasSubstr("b.t: job"));
 }
 
 // Released together, the urgent task runs first and no job misses. Only other offsets reveal the miss.
@@ -76,11 +72,7 @@ TEST(SimulatedMisses, EndToEndDeadline) {
     return miss_of(workload(text));
   };
   EXPECT_FALSE(with("10ms"));
-  const auto miss = with("9ms");
-  ASSERT_TRUE(miss);
-  EXPECT_THAT(
-      miss->what,
-      HasSubstr("a.d: job 0 had an end-to-end response time of at least 10ms; its DAG's end-to-end deadline is 9ms"));
+  EXPECT_TRUE(with("9ms"));
 }
 
 TEST(SimulatedMisses, UnfinishedAtTheEnd) {

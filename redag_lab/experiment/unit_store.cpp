@@ -3,9 +3,20 @@
 
 #include "redag_lab/experiment/unit_store.hpp"
 
-#include <sqlite3.h>
+#include <fcntl.h>
+#include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
+#include <sys/file.h>
+#include <unistd.h>
 
-#include <array>
+#include <cerrno>
+#include <charconv>
+#include <chrono>
+#include <cstring>
+#include <filesystem>
+#include <mutex>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
@@ -16,210 +27,158 @@
 namespace redag::experiment {
 namespace {
 
+namespace fs = std::filesystem;
 using trace::file_error;
 
-// The whole schema. A file with anything else in it, such as a view that never ends, is refused before it is read.
-constexpr std::array<const char *, 2> kTables = {"CREATE TABLE origin(subject TEXT NOT NULL)",
-                                                 "CREATE TABLE units(unit INTEGER PRIMARY KEY, result TEXT NOT NULL)"};
-constexpr int kLongestText = 1 << 24;  // bytes of a result
+Time now() { return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1); }
 
-tl::unexpected<Diagnostics> failure(const std::string &path, sqlite3 *database, std::string_view what) {
-  const int code = database == nullptr ? SQLITE_NOMEM : sqlite3_errcode(database);
-  if (code == SQLITE_BUSY || code == SQLITE_LOCKED) {
-    return file_error(path, 0, "another process is writing to this folder",
-                      "wait for that process, or choose another folder");
-  }
-  if (code == SQLITE_NOTADB || code == SQLITE_CORRUPT) {
-    return file_error(path, 0, fmt::format("is damaged or no database: {}", sqlite3_errmsg(database)),
-                      "choose another folder, or restore the file");
-  }
-  return file_error(path, 0, fmt::format("{}: {}", what, database == nullptr ? "no memory" : sqlite3_errmsg(database)));
+std::string row_of(std::uint64_t unit, std::string_view result) {
+  const std::string fields = fmt::format("{},{}", unit, result);
+  return fmt::format("{:016x},{}\n", checksum(fields), fields);
 }
 
-std::string text_of(sqlite3_stmt *row, int column) {
-  const auto *text = static_cast<const char *>(sqlite3_column_blob(row, column));
-  return text == nullptr ? std::string()
-                         : std::string(text, static_cast<std::size_t>(sqlite3_column_bytes(row, column)));
+// Returns nothing for a row that is damaged.
+std::optional<std::pair<std::uint64_t, std::string>> parse_row(std::string_view line) {
+  const std::size_t unit_at = line.find(',') + 1;
+  const std::size_t result_at = line.find(',', unit_at) + 1;
+  if (unit_at == 0 || result_at == 0) return std::nullopt;
+  std::uint64_t unit = 0;
+  const auto [stop, bad] = std::from_chars(line.data() + unit_at, line.data() + result_at - 1, unit);
+  std::string result(line.substr(result_at));
+  if (bad != std::errc() || row_of(unit, result) != fmt::format("{}\n", line)) return std::nullopt;
+  return std::pair(unit, std::move(result));
+}
+
+// Reads the rows of a file. Returns the length of its whole rows: a killed process can leave a part of one.
+Result<std::size_t> read_rows(const std::string &file, const std::string &subject, const Accept &accept) {
+  const Result<std::string> text = trace::read_file(file);
+  if (!text) return tl::unexpected<Diagnostics>(text.error());
+  std::string_view rest = *text;
+  for (std::size_t end = 0; (end = rest.find('\n')) != std::string_view::npos; rest.remove_prefix(end + 1)) {
+    const std::string_view line = rest.substr(0, end);
+    if (rest.size() == text->size()) {
+      if (line == subject) continue;
+      return file_error(file, 1, "holds results of another plan or of another version of redag",
+                        fmt::format("expected '{}': choose another folder", subject));
+    }
+    const auto row = parse_row(line);
+    if (!row) continue;
+    if (const Result<void> accepted = accept(row->first, row->second); !accepted) {
+      return tl::unexpected<Diagnostics>(accepted.error());
+    }
+  }
+  return text->size() - rest.size();
 }
 
 }  // namespace
 
-void UnitCursor::Finalize::operator()(sqlite3_stmt *statement) const { sqlite3_finalize(statement); }
-
-Result<bool> UnitCursor::next() {
-  const int code = sqlite3_step(rows_.get());
-  if (code == SQLITE_DONE) return false;
-  if (code != SQLITE_ROW) return failure(path_, sqlite3_db_handle(rows_.get()), "cannot read");
-  unit_.unit = static_cast<std::uint64_t>(sqlite3_column_int64(rows_.get(), 0));
-  unit_.result = text_of(rows_.get(), 1);
-  return true;
+Result<Shard> parse_shard(std::string_view text) {
+  Shard shard;
+  const char *end = text.data() + text.size();
+  const auto [slash, bad_index] = std::from_chars(text.data(), end, shard.index);
+  if (bad_index == std::errc() && slash != end && *slash == '/') {
+    const auto [stop, bad_count] = std::from_chars(slash + 1, end, shard.count);
+    if (bad_count == std::errc() && stop == end && shard.index >= 1 && shard.index <= shard.count) return shard;
+  }
+  return make_error(fmt::format("'{}' is not a shard", text), "write i/n with 1 <= i <= n, such as 1/4");
 }
 
-tl::unexpected<Diagnostics> two_results(const std::string &file, std::uint64_t unit, std::string_view first,
-                                        std::string_view second) {
-  return file_error(file, 0, fmt::format("unit {} has two results, '{}' and '{}'", unit, first, second),
-                    "a unit depends on the plan alone: were they run by different builds of redag?");
+std::uint64_t checksum(std::string_view text) {
+  std::uint64_t hash = 0xcbf29ce484222325ULL;
+  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ULL;
+  return hash;
 }
 
-void UnitStore::Close::operator()(sqlite3 *database) const { sqlite3_close(database); }
+Result<UnitStore> UnitStore::open(const std::string &folder, const std::string &subject, Shard shard,
+                                  const Accept &accept) {
+  const std::string own =
+      shard.count == 1 ? folder + "/units.csv" : fmt::format("{}/units-{}-of-{}.csv", folder, shard.index, shard.count);
+  const auto failed = [&own](const char *what) {
+    return file_error(own, 0, fmt::format("{}: {}", what, std::strerror(errno)));
+  };
+  const int descriptor = ::open(own.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+  if (descriptor < 0) return failed("cannot open");
+  UnitStore store(own, descriptor);
+  if (::flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
+    if (errno != EWOULDBLOCK) return failed("cannot lock");
+    return file_error(own, 0, "another process is writing to this file", "wait for it, or choose another folder");
+  }
+  const Result<std::size_t> whole = read_rows(own, subject, accept);
+  if (!whole) return tl::unexpected<Diagnostics>(whole.error());
+  if (::ftruncate(descriptor, static_cast<off_t>(*whole)) != 0) return failed("cannot write");
+  std::error_code error;
+  for (const fs::directory_entry &entry : fs::directory_iterator(folder, error)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with("units") || !name.ends_with(".csv") || entry.path() == fs::path(own)) continue;
+    const Result<std::size_t> read = read_rows(entry.path().string(), subject, accept);
+    if (!read) return tl::unexpected<Diagnostics>(read.error());
+  }
+  if (*whole == 0) {
+    if (const Result<void> begun = store.write(subject + "\n"); !begun) {
+      return tl::unexpected<Diagnostics>(begun.error());
+    }
+  }
+  return store;
+}
 
-UnitStore::UnitStore(UnitStore &&other) noexcept = default;
+UnitStore::UnitStore(UnitStore &&other) noexcept
+    : path_(std::move(other.path_)), descriptor_(std::exchange(other.descriptor_, -1)), last_sync_(other.last_sync_) {}
 
 UnitStore::~UnitStore() {
-  if (database_ == nullptr) return;
-  static_cast<void>(sync());
-  insert_.reset();
-  // One plain file remains, which can be read where nothing can be written.
-  sqlite3_exec(database_.get(), "PRAGMA journal_mode=DELETE", nullptr, nullptr, nullptr);
+  if (descriptor_ >= 0) ::close(descriptor_);
 }
 
-Result<UnitStore> UnitStore::open(const std::string &path, std::string_view subject) {
-  UnitStore store(path);
-  Result<void> ready = store.connect(true);
-  // Exclusive locking keeps no shared memory: write-ahead logs then work on network file systems, too.
-  if (ready) ready = store.execute("PRAGMA journal_mode=WAL; PRAGMA synchronous=NORMAL", "cannot open");
-  if (ready) ready = store.create(subject);
-  if (ready) ready = store.check(subject);
-  if (!ready) return tl::unexpected<Diagnostics>(std::move(ready.error()));
-  Result<Statement> insert = store.prepare("INSERT INTO units VALUES(?1, ?2) ON CONFLICT DO NOTHING");
-  if (!insert) return tl::unexpected<Diagnostics>(std::move(insert.error()));
-  store.insert_ = std::move(*insert);
-  return store;
-}
-
-Result<UnitStore> UnitStore::read(const std::string &path, std::string_view subject) {
-  UnitStore store(path);
-  Result<void> ready = store.connect(false);
-  if (ready) ready = store.execute("PRAGMA cache_size=-256; PRAGMA journal_mode=DELETE", "cannot open");
-  if (ready) ready = store.check(subject);
-  if (!ready) return tl::unexpected<Diagnostics>(std::move(ready.error()));
-  return store;
-}
-
-Result<void> UnitStore::connect(bool create) {
-  sqlite3 *database = nullptr;
-  const int flags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX | (create ? SQLITE_OPEN_CREATE : 0);
-  const int code = sqlite3_open_v2(path_.c_str(), &database, flags, nullptr);
-  database_.reset(database);
-  if (code != SQLITE_OK) return failure(path_, database, "cannot open");
-  sqlite3_limit(database, SQLITE_LIMIT_LENGTH, kLongestText);
-  sqlite3_db_config(database, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
-  return execute("PRAGMA trusted_schema=OFF; PRAGMA cell_size_check=ON; PRAGMA locking_mode=EXCLUSIVE", "cannot open");
-}
-
-// Fills an empty file in one transaction: a kill leaves it empty or whole.
-Result<void> UnitStore::create(std::string_view subject) {
-  Result<Statement> any = prepare("SELECT 1 FROM sqlite_master");
-  if (!any) return tl::unexpected<Diagnostics>(std::move(any.error()));
-  const int code = sqlite3_step(any->get());
-  if (code == SQLITE_ROW) return {};
-  if (code != SQLITE_DONE) return failure(path_, database_.get(), "cannot read");
-  any->reset();
-  const std::string text = fmt::format("BEGIN;{};{}", kTables[0], kTables[1]);
-  if (Result<void> made = execute(text.c_str(), "cannot write"); !made) return made;
-  Result<Statement> origin = prepare("INSERT INTO origin VALUES(?1)");
-  if (!origin) return tl::unexpected<Diagnostics>(std::move(origin.error()));
-  sqlite3_bind_text(origin->get(), 1, subject.data(), static_cast<int>(subject.size()), SQLITE_STATIC);
-  if (sqlite3_step(origin->get()) != SQLITE_DONE) return failure(path_, database_.get(), "cannot write");
-  origin->reset();
-  return execute("COMMIT", "cannot write");
-}
-
-Result<void> UnitStore::check(std::string_view subject) {
-  Result<Statement> schema = prepare("SELECT sql FROM sqlite_master ORDER BY name");
-  if (!schema) return tl::unexpected<Diagnostics>(std::move(schema.error()));
-  std::size_t known = 0;
-  int code = SQLITE_OK;
-  while ((code = sqlite3_step(schema->get())) == SQLITE_ROW) {
-    if (known == kTables.size() || text_of(schema->get(), 0) != kTables[known]) break;
-    ++known;
+Result<void> UnitStore::write(std::string_view text) {
+  while (!text.empty()) {
+    const ssize_t written = ::write(descriptor_, text.data(), text.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return file_error(path_, 0, fmt::format("cannot write: {}", std::strerror(errno)));
+    text.remove_prefix(static_cast<std::size_t>(written));
   }
-  if (code != SQLITE_ROW && code != SQLITE_DONE) return failure(path_, database_.get(), "cannot read");
-  if (code == SQLITE_ROW || known != kTables.size()) {
-    return file_error(path_, 0, "is a database, but not one of finished units", "choose another folder");
-  }
-  Result<Statement> origin = prepare("SELECT subject FROM origin");
-  if (!origin) return tl::unexpected<Diagnostics>(std::move(origin.error()));
-  code = sqlite3_step(origin->get());
-  if (code != SQLITE_ROW && code != SQLITE_DONE) return failure(path_, database_.get(), "cannot read");
-  if (code == SQLITE_ROW && text_of(origin->get(), 0) == subject) return {};
-  return file_error(path_, 0, "holds results of another plan or of another version of redag",
-                    fmt::format("expected '{}'; choose another folder", subject));
-}
-
-Result<void> UnitStore::execute(const char *statement, const char *what) {
-  if (sqlite3_exec(database_.get(), statement, nullptr, nullptr, nullptr) == SQLITE_OK) return {};
-  return failure(path_, database_.get(), what);
-}
-
-Result<UnitStore::Statement> UnitStore::prepare(const char *text) const {
-  sqlite3_stmt *statement = nullptr;
-  const int code = sqlite3_prepare_v2(database_.get(), text, -1, &statement, nullptr);
-  Statement owned(statement);
-  if (code == SQLITE_OK) return owned;
-  return failure(path_, database_.get(), "cannot read");
-}
-
-Result<UnitCursor> UnitStore::units() const {
-  Result<Statement> rows = prepare("SELECT unit, result FROM units ORDER BY unit");
-  if (!rows) return tl::unexpected<Diagnostics>(std::move(rows.error()));
-  UnitCursor cursor;
-  cursor.path_ = path_;
-  cursor.rows_ = std::move(*rows);
-  return cursor;
-}
-
-// The unit is there already: its result must be this one.
-Result<void> UnitStore::compare(std::uint64_t unit, const std::string &result) {
-  Result<Statement> there = prepare("SELECT result FROM units WHERE unit = ?1");
-  if (!there) return tl::unexpected<Diagnostics>(std::move(there.error()));
-  sqlite3_bind_int64(there->get(), 1, static_cast<sqlite3_int64>(unit));
-  if (sqlite3_step(there->get()) != SQLITE_ROW) return failure(path_, database_.get(), "cannot read");
-  const std::string first = text_of(there->get(), 0);
-  if (first == result) return {};
-  return two_results(path_, unit, first, result);
+  return {};
 }
 
 Result<void> UnitStore::append(std::uint64_t unit, const std::string &result) {
   REDAG_CHECK(result.find('\n') == std::string::npos, "a result is one line");
-  if (broken_) return {};
-  if (!open_transaction_) {
-    if (Result<void> begun = execute("BEGIN", "cannot write"); !begun) return begun;
-    open_transaction_ = true;
-  }
-  sqlite3_bind_int64(insert_.get(), 1, static_cast<sqlite3_int64>(unit));
-  sqlite3_bind_text(insert_.get(), 2, result.data(), static_cast<int>(result.size()), SQLITE_STATIC);
-  const bool written = sqlite3_step(insert_.get()) == SQLITE_DONE;
-  const bool added = written && sqlite3_changes(database_.get()) == 1;
-  Result<void> done;
-  if (!written) done = failure(path_, database_.get(), "cannot write");
-  sqlite3_reset(insert_.get());
-  sqlite3_clear_bindings(insert_.get());
-  if (written && !added) done = compare(unit, result);
-  if (!done) {
-    broken_ = !written;
-    return done;
-  }
-  const Clock::time_point now = Clock::now();
-  if (now - last_sync_ >= kSyncEvery) return sync();
-  if (now - last_write_ >= kWriteEvery) return commit();
-  return {};
-}
-
-Result<void> UnitStore::commit() {
-  last_write_ = Clock::now();
-  if (broken_ || !open_transaction_) return {};
-  open_transaction_ = false;
-  Result<void> done = execute("COMMIT", "cannot write");
-  broken_ = !done;
-  return done;
+  if (Result<void> written = write(row_of(unit, result)); !written) return written;
+  return now() - last_sync_ < 2 * kSecond ? Result<void>() : sync();
 }
 
 Result<void> UnitStore::sync() {
-  if (Result<void> written = commit(); !written) return written;
-  last_sync_ = Clock::now();
-  if (broken_ || insert_ == nullptr) return {};
-  return execute("PRAGMA wal_checkpoint(PASSIVE)", "cannot write to disk");
+  last_sync_ = now();
+  if (::fdatasync(descriptor_) == 0) return {};
+  return file_error(path_, 0, fmt::format("cannot write to disk: {}", std::strerror(errno)));
+}
+
+Result<void> run_units(const std::vector<std::uint64_t> &units, std::uint32_t jobs, const std::atomic<bool> &stop,
+                       const Evaluate &evaluate, const Accept &accept) {
+  std::atomic<std::size_t> next{0};
+  std::atomic<bool> failed{false};
+  std::mutex mutex;  // guards `done` and calls of `accept`
+  Result<void> done;
+  const auto work = [&] {
+    while (!stop && !failed) {
+      const std::size_t mine = next++;
+      if (mine >= units.size()) return;
+      const Result<std::string> result = evaluate(units[mine]);
+      const std::lock_guard lock(mutex);
+      if (!done) return;
+      if (result) {
+        done = accept(units[mine], *result);
+      } else {
+        done = tl::unexpected<Diagnostics>(result.error());
+      }
+      if (!done) failed = true;
+    }
+  };
+  namespace tbb = oneapi::tbb;
+  const tbb::global_control allow(tbb::global_control::max_allowed_parallelism, jobs);
+  tbb::task_arena arena(static_cast<int>(jobs));
+  arena.execute([&] {
+    tbb::parallel_for(
+        0U, jobs, [&](std::uint32_t) { work(); }, tbb::simple_partitioner());
+  });
+  return done;
 }
 
 }  // namespace redag::experiment

@@ -1,96 +1,75 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// units.db: the finished units of an experiment, a SQLite database in which a killed run can continue. Units reach the
-// kernel within kWriteEvery and the disk within kSyncEvery, and are read one by one in bounded memory. One process at a
-// time uses the file, from whichever machine; not thread-safe.
+// Runs the units of an experiment on several processors (oneTBB), and keeps the finished ones in a folder that several
+// processes can share: a killed run goes on there. A process appends a row for each unit to a file of its own, with a
+// checksum. It reads the rows of all.
 #pragma once
 
-#include <chrono>
+#include <atomic>
 #include <cstdint>
-#include <memory>
+#include <functional>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "redag/base/result.hpp"
-#include "redag_lab/experiment/finished_unit.hpp"
-
-struct sqlite3;
-struct sqlite3_stmt;
+#include "redag/base/time.hpp"
 
 namespace redag::experiment {
 
-/// Reads the units of a store in their order. The store must outlive it.
-class UnitCursor {
- public:
-  /// Moves to the next unit. Returns false at the end. Error: the file is damaged.
-  [[nodiscard]] Result<bool> next();
-  [[nodiscard]] const FinishedUnit &unit() const { return unit_; }
+/// The share of the units that one of several processes runs: those with unit mod count = index - 1.
+struct Shard {
+  std::uint32_t index = 1;  // from 1
+  std::uint32_t count = 1;
 
- private:
-  friend class UnitStore;
-  struct Finalize {
-    void operator()(sqlite3_stmt *statement) const;
-  };
-
-  std::string path_;
-  std::unique_ptr<sqlite3_stmt, Finalize> rows_;
-  FinishedUnit unit_;
+  [[nodiscard]] constexpr bool owns(std::uint64_t unit) const { return unit % count == index - 1; }
 };
+/// Parses "2/4". Error: another form, or not 1 <= i <= n.
+[[nodiscard]] Result<Shard> parse_shard(std::string_view text);
 
+/// Returns a hash of the text (FNV-1a).
+[[nodiscard]] std::uint64_t checksum(std::string_view text);
+
+using Accept = std::function<Result<void>(std::uint64_t unit, const std::string &result)>;
+
+/// Not thread-safe.
 class UnitStore {
  public:
-  static constexpr std::chrono::milliseconds kWriteEvery{200};
-  static constexpr std::chrono::seconds kSyncEvery{2};
-
-  /// Opens or creates the file. `subject` identifies the origin of the results; a file of another subject is refused.
-  /// Errors: the file cannot be used, another process uses it, or it is no database of units.
-  [[nodiscard]] static Result<UnitStore> open(const std::string &path, std::string_view subject);
-  /// Opens an existing file for reading, for merging. It changes only what a killed run left unfinished.
-  [[nodiscard]] static Result<UnitStore> read(const std::string &path, std::string_view subject);
+  /// Opens units.csv, or units-i-of-n.csv for a shard, and gives the units of all such files to `accept`; a unit can
+  /// come twice. Leaves out damaged rows: those units are run again. `subject` is one line that names the plan and the
+  /// version. Errors: a file of another subject, a file that cannot be used or that another process writes, and those
+  /// of `accept`.
+  [[nodiscard]] static Result<UnitStore> open(const std::string &folder, const std::string &subject, Shard shard,
+                                              const Accept &accept);
 
   UnitStore(UnitStore &&other) noexcept;
   UnitStore &operator=(UnitStore &&) = delete;
   UnitStore(const UnitStore &) = delete;
   UnitStore &operator=(const UnitStore &) = delete;
-  /// Writes the remaining units. To detect a failure, call sync() first.
   ~UnitStore();
 
-  [[nodiscard]] Result<UnitCursor> units() const;
-
-  /// Adds a result, in any order. The same result of a unit counts once. Errors: another result of this unit, or the
-  /// file cannot be written; nothing more is written then.
+  /// Appends a row, which outlives this process; it outlives the machine within two seconds. `result` is one line.
   [[nodiscard]] Result<void> append(std::uint64_t unit, const std::string &result);
-  /// Writes all units to the disk.
+  /// Writes all rows to the disk.
   [[nodiscard]] Result<void> sync();
 
  private:
-  using Clock = std::chrono::steady_clock;
-  struct Close {
-    void operator()(sqlite3 *database) const;
-  };
-  using Statement = std::unique_ptr<sqlite3_stmt, UnitCursor::Finalize>;
-
-  explicit UnitStore(std::string path) : path_(std::move(path)) {}
-  [[nodiscard]] Result<void> connect(bool create);
-  [[nodiscard]] Result<void> create(std::string_view subject);
-  [[nodiscard]] Result<void> check(std::string_view subject);
-  [[nodiscard]] Result<void> execute(const char *statement, const char *what);
-  [[nodiscard]] Result<Statement> prepare(const char *text) const;
-  [[nodiscard]] Result<void> compare(std::uint64_t unit, const std::string &result);
-  [[nodiscard]] Result<void> commit();
+  UnitStore(std::string path, int descriptor) : path_(std::move(path)), descriptor_(descriptor) {}
+  [[nodiscard]] Result<void> write(std::string_view text);
 
   std::string path_;
-  std::unique_ptr<sqlite3, Close> database_;
-  Statement insert_;
-  bool open_transaction_ = false;
-  bool broken_ = false;
-  Clock::time_point last_write_ = Clock::now();
-  Clock::time_point last_sync_ = last_write_;
+  int descriptor_ = -1;
+  Time last_sync_ = 0;
 };
 
-/// The error for a unit that has two results.
-[[nodiscard]] tl::unexpected<Diagnostics> two_results(const std::string &file, std::uint64_t unit,
-                                                      std::string_view first, std::string_view second);
+/// Returns a unit's result, one line of text. Several threads call it at once.
+using Evaluate = std::function<Result<std::string>(std::uint64_t unit)>;
+
+/// Evaluates the units, `jobs` at the same time, and calls `accept` one at a time, in any order. Once `stop` is true,
+/// leaves out the units that have not begun. Error: the first one of `evaluate` or `accept`; no unit is begun after it.
+[[nodiscard]] Result<void> run_units(const std::vector<std::uint64_t> &units, std::uint32_t jobs,
+                                     const std::atomic<bool> &stop, const Evaluate &evaluate, const Accept &accept);
 
 }  // namespace redag::experiment

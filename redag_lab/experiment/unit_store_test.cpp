@@ -11,15 +11,15 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <sstream>
-#include <vector>
 
 namespace redag::experiment {
 namespace {
 
-using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-using ::testing::IsEmpty;
+
+using Units = std::map<std::uint64_t, std::string>;
 
 class UnitStoreTest : public ::testing::Test {
  protected:
@@ -28,135 +28,106 @@ class UnitStoreTest : public ::testing::Test {
               ("units-" + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()) + "-" +
                std::to_string(::getpid()));
     std::filesystem::create_directory(folder_);
-    file_ = folder_ / "units.db";
+    file_ = folder_ / "units.csv";
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
-  [[nodiscard]] static std::string bytes(const std::string &file) {
+  [[nodiscard]] std::string bytes() const {
     std::ostringstream out;
-    out << std::ifstream(file).rdbuf();
+    out << std::ifstream(file_).rdbuf();
     return out.str();
   }
   void write(const std::string &bytes) const { std::ofstream(file_) << bytes; }
 
-  void fill(std::initializer_list<FinishedUnit> units) const {
-    Result<UnitStore> store = UnitStore::open(file_, "plan a");
-    ASSERT_TRUE(store) << to_string(store.error());
-    for (const FinishedUnit &unit : units) ASSERT_TRUE(store->append(unit.unit, unit.result));
-    ASSERT_TRUE(store->sync());
+  // Opens the store and puts what it holds into `units`.
+  [[nodiscard]] Result<UnitStore> open(Units &units, Shard shard = {}, const std::string &subject = "plan a") const {
+    return UnitStore::open(folder_, subject, shard, [&units](std::uint64_t unit, const std::string &result) {
+      units[unit] = result;
+      return Result<void>{};
+    });
   }
-
-  [[nodiscard]] static std::vector<FinishedUnit> units(const UnitStore &store) {
-    std::vector<FinishedUnit> all;
-    Result<UnitCursor> cursor = store.units();
-    EXPECT_TRUE(cursor);
-    for (;;) {
-      const Result<bool> more = cursor->next();
-      EXPECT_TRUE(more) << to_string(more.error());
-      if (!more || !*more) return all;
-      all.push_back(cursor->unit());
-    }
-  }
-  [[nodiscard]] std::vector<FinishedUnit> read() const {
-    const Result<UnitStore> store = UnitStore::read(file_, "plan a");
+  [[nodiscard]] Units read() const {
+    Units units;
+    const Result<UnitStore> store = open(units);
     EXPECT_TRUE(store) << to_string(store.error());
-    return store ? units(*store) : std::vector<FinishedUnit>{};
+    return units;
   }
-
-  [[nodiscard]] std::string error() const {
-    const Result<UnitStore> store = UnitStore::open(file_, "plan a");
-    return store ? "" : to_string(store.error());
+  void fill(const Units &units, Shard shard = {}) const {
+    Units before;
+    Result<UnitStore> store = open(before, shard);
+    ASSERT_TRUE(store) << to_string(store.error());
+    for (const auto &[unit, result] : units) ASSERT_TRUE(store->append(unit, result));
   }
 
   std::filesystem::path folder_;
   std::string file_;
 };
 
-TEST_F(UnitStoreTest, ReadsInOrderWhatWasAppended) {
-  fill({{7, "01"}, {3, "11"}});
+TEST_F(UnitStoreTest, ReadsWhatWasAppended) {
+  EXPECT_EQ(read(), Units());
+  fill({{7, "01"}, {3, "[1,\"a,b\"]"}});
   fill({{5, "-u"}});
-  EXPECT_THAT(read(), ElementsAre(FinishedUnit{3, "11"}, FinishedUnit{5, "-u"}, FinishedUnit{7, "01"}));
-  EXPECT_EQ(bytes(file_ + "-wal"), "") << "one plain file remains";
+  EXPECT_EQ(read(), (Units{{3, "[1,\"a,b\"]"}, {5, "-u"}, {7, "01"}}));
 }
 
-// The files of a process that was killed after a commit: the last commit is only in the write-ahead log.
-TEST_F(UnitStoreTest, GoesOnAfterAnyCutOfTheLog) {
-  const std::string killed = folder_ / "killed.db";
-  {
-    Result<UnitStore> store = UnitStore::open(file_, "plan a");
-    ASSERT_TRUE(store);
-    ASSERT_TRUE(store->append(0, "01"));
-    ASSERT_TRUE(store->sync());
-    ASSERT_TRUE(store->append(1, "11"));
-    ASSERT_TRUE(store->sync());
-    std::filesystem::copy_file(file_, killed);
-    std::filesystem::copy_file(file_ + "-wal", killed + "-wal");
-  }
-  const std::string database = bytes(killed);
-  const std::string log = bytes(killed + "-wal");
-  ASSERT_GT(log.size(), 4096U);
-  for (std::size_t length = 0; length <= log.size(); length += 97) {
-    write(database);
-    std::ofstream(file_ + "-wal") << log.substr(0, length);
-    Result<UnitStore> store = UnitStore::open(file_, "plan a");
-    ASSERT_TRUE(store) << length << to_string(store.error());
-    const std::vector<FinishedUnit> before = units(*store);
-    ASSERT_LE(before.size(), 2U);
-    ASSERT_TRUE(store->append(0, "01")) << length;
-    ASSERT_TRUE(store->append(1, "11")) << length;
-    ASSERT_THAT(units(*store), ElementsAre(FinishedUnit{0, "01"}, FinishedUnit{1, "11"})) << length;
+TEST_F(UnitStoreTest, GoesOnAfterAnyCut) {
+  fill({{0, "01"}, {1, "11"}});
+  const std::string whole = bytes();
+  for (std::size_t length = 0; length <= whole.size(); ++length) {
+    write(whole.substr(0, length));
+    Units units = read();
+    EXPECT_LE(units.size(), 2U);
+    fill({{0, "01"}, {1, "11"}});
+    EXPECT_EQ(read(), (Units{{0, "01"}, {1, "11"}})) << length;
   }
 }
 
-TEST_F(UnitStoreTest, RefusesAnotherSubject) {
+TEST_F(UnitStoreTest, LeavesOutADamagedRow) {
+  fill({{0, "01"}, {1, "11"}, {2, "10"}});
+  std::string damaged = bytes();
+  damaged[damaged.find(",1,11") + 4] = '0';
+  write(damaged + "x\n,\n,,\n");
+  EXPECT_EQ(read(), (Units{{0, "01"}, {2, "10"}}));
+}
+
+TEST_F(UnitStoreTest, SharesAFolder) {
+  fill({{0, "01"}}, {1, 2});
+  fill({{1, "11"}}, {2, 2});
+  EXPECT_EQ(read(), (Units{{0, "01"}, {1, "11"}}));
+  Units first;
+  Units second;
+  const Result<UnitStore> one = open(first, {1, 2});
+  EXPECT_TRUE(open(second, {2, 2})) << "each writes its own file";
+  EXPECT_EQ(first, second);
+}
+
+TEST_F(UnitStoreTest, RefusesAnotherSubjectAndOtherFiles) {
   fill({{0, "01"}});
-  const Result<UnitStore> other = UnitStore::open(file_, "plan b");
+  Units units;
+  const Result<UnitStore> other = open(units, {}, "plan b");
   ASSERT_FALSE(other);
-  EXPECT_THAT(other.error().front().message, HasSubstr("another plan"));
-  EXPECT_FALSE(UnitStore::read(file_, "plan b"));
-}
-
-TEST_F(UnitStoreTest, RefusesOtherFiles) {
-  write("unit,result\n0,01\n this is text, and longer than the header of a database: it has a hundred bytes or more..");
-  EXPECT_THAT(error(), HasSubstr("units.db: error: is damaged or no database"));
-  EXPECT_FALSE(UnitStore::read(folder_ / "none.db", "plan a"));
-  EXPECT_FALSE(std::filesystem::exists(folder_ / "none.db"));
-  // An empty file is one whose creator was killed.
-  write("");
-  fill({{0, "01"}});
-  EXPECT_THAT(read(), ElementsAre(FinishedUnit{0, "01"}));
-}
-
-TEST_F(UnitStoreTest, RefusesADamagedPage) {
-  fill({{0, std::string(3000, 'x')}, {1, std::string(3000, 'y')}, {2, std::string(3000, 'z')}});
-  std::string damaged = bytes(file_);
-  damaged.replace(8192, 100, std::string(100, '\xff'));
-  write(damaged);
-  const Result<UnitStore> store = UnitStore::read(file_, "plan a");
-  ASSERT_TRUE(store) << to_string(store.error());
-  Result<UnitCursor> cursor = store->units();
-  ASSERT_TRUE(cursor);
-  Result<bool> more = true;
-  while (more && *more) more = cursor->next();
-  ASSERT_FALSE(more);
-  EXPECT_THAT(to_string(more.error()), HasSubstr("is damaged"));
-}
-
-TEST_F(UnitStoreTest, CountsAUnitOnce) {
-  fill({{0, "01"}, {0, "01"}});
-  EXPECT_EQ(read().size(), 1U);
-  Result<UnitStore> store = UnitStore::open(file_, "plan a");
-  ASSERT_TRUE(store);
-  const Result<void> clash = store->append(0, "00");
-  ASSERT_FALSE(clash);
-  EXPECT_THAT(to_string(clash.error()), HasSubstr("unit 0 has two results, '01' and '00'"));
+  EXPECT_THAT(to_string(other.error()), HasSubstr("units.csv:1:1: error: holds results of another plan"));
+  EXPECT_THAT(to_string(other.error()), HasSubstr("expected 'plan b'"));
+  EXPECT_FALSE(open(units, {1, 2}, "plan b")) << "beside the file of another plan";
+  EXPECT_EQ(read(), (Units{{0, "01"}}));
+  write("unit,result\n0,01\n");
+  EXPECT_FALSE(open(units));
 }
 
 TEST_F(UnitStoreTest, IsOfOneProcess) {
-  const Result<UnitStore> first = UnitStore::open(file_, "plan a");
-  ASSERT_TRUE(first);
-  EXPECT_THAT(error(), HasSubstr("another process is writing to this folder"));
-  EXPECT_FALSE(UnitStore::read(file_, "plan a"));
+  Units units;
+  const Result<UnitStore> first = open(units);
+  const Result<UnitStore> second = open(units);
+  ASSERT_FALSE(second);
+  EXPECT_THAT(to_string(second.error()), HasSubstr("another process is writing to this file"));
+}
+
+TEST_F(UnitStoreTest, AnErrorOfTheReaderIsOne) {
+  fill({{0, "01"}});
+  const Result<UnitStore> store =
+      UnitStore::open(folder_, "plan a", {},
+                      [](std::uint64_t, const std::string &) -> Result<void> { return make_error("no such unit"); });
+  EXPECT_FALSE(store);
 }
 
 // A limit on file size acts as a full disk.
@@ -165,27 +136,31 @@ TEST_F(UnitStoreTest, FullDisk) {
   rlimit before{};
   ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
   const auto handler = std::signal(SIGXFSZ, SIG_IGN);
-  const rlimit limit{static_cast<rlim_t>(bytes(file_).size()), before.rlim_max};
+  const rlimit limit{static_cast<rlim_t>(bytes().size() + 10), before.rlim_max};
   ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &limit), 0);
   Result<void> written;
   {
-    Result<UnitStore> store = UnitStore::open(file_, "plan a");
+    Units units;
+    Result<UnitStore> store = open(units);
     ASSERT_TRUE(store) << to_string(store.error());
-    for (std::uint64_t unit = 1; unit < 100 && written; ++unit) {
-      written = store->append(unit, std::string(1000, '1'));
-      if (written) written = store->sync();
-    }
+    written = store->append(1, std::string(1000, '1'));
   }
   ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
   std::signal(SIGXFSZ, handler);
   ASSERT_FALSE(written);
-  EXPECT_THAT(to_string(written.error()), HasSubstr("units.db: error: cannot write"));
-  EXPECT_THAT(read().front(), (FinishedUnit{0, "01"})) << "what was written stays";
+  EXPECT_THAT(to_string(written.error()), HasSubstr("units.csv: error: cannot write"));
+  fill({{1, "11"}});
+  EXPECT_EQ(read(), (Units{{0, "01"}, {1, "11"}})) << "what was written stays";
 }
 
-TEST_F(UnitStoreTest, AnEmptyStoreHasNoUnits) {
-  fill({});
-  EXPECT_THAT(read(), IsEmpty());
+TEST(Shards, AreOneOfSeveral) {
+  const Result<Shard> shard = parse_shard("2/4");
+  ASSERT_TRUE(shard);
+  EXPECT_EQ(shard->index, 2U);
+  EXPECT_TRUE(shard->owns(5));
+  EXPECT_FALSE(shard->owns(4));
+  for (const char *bad : {"", "0/2", "3/2", "1", "1/", "/2", "a/b", "1/2x", "-1/2"})
+    EXPECT_FALSE(parse_shard(bad)) << bad;
 }
 
 }  // namespace

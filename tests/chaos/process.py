@@ -98,6 +98,13 @@ def workload(rng, folder, tasks=4, busy=True):
     return path
 
 
+def acceptance_plan(folder, sets, seed=1):
+    """Writes the plan of an experiment."""
+    path = folder / "plan.yaml"
+    path.write_text(f"experiment: acceptance\nutilization: [0.3, 0.6]\nsets: {sets}\nseed: {seed}\n")
+    return path
+
+
 def some_command(rng, folder):
     """Returns a command that takes a while."""
     file = workload(rng, folder)
@@ -107,7 +114,7 @@ def some_command(rng, folder):
         ["run", file, "--duration", "20s", "--preemption", rng.choice(["none", "cooperative"]), *out],
         ["simulate", file, "--duration", "20000s", *out],
         ["compare", file, "--duration", "1s", "--executors", "redag-none,mte", "--repeat", "20", *out],
-        ["experiment", "acceptance", SOURCE / "experiments" / "acceptance_dags.yaml", *out],
+        ["experiment", SOURCE / "experiments" / "acceptance_dags.yaml", *out],
         ["sensitivity", SOURCE / "workloads" / "robot.yaml", "--simulate"],
     ])
 
@@ -239,7 +246,7 @@ def no_threads(rng, folder):
     limit = (resource.RLIMIT_NPROC, (rng.randint(1, 6),) * 2)
     arguments = ["run", file, "--duration", "100ms", "--workers", rng.randint(1, 64), "--preemption", "none"]
     if rng.random() < 0.3:
-        arguments = ["experiment", "acceptance", "--utilization", "0.5", "--sets", "20", "--out", "/dev/shm/none"]
+        arguments = ["experiment", acceptance_plan(folder, 20), "--out", "/dev/shm/none"]
     child = Child(*arguments, executable=program, prepare=as_nobody(limit)).end()
     check_results(folder)
 
@@ -249,7 +256,7 @@ def read_only(rng, folder):
     program, file = for_everybody(folder, rng)
     (folder / "out").mkdir(mode=0o755)
     command = rng.choice([["run", file, "--duration", "100ms"], ["simulate", file], ["compare", file, "--simulate"],
-                          ["generate", "--count", "2"], ["experiment", "acceptance", "--sets", "2"]])
+                          ["generate", "--count", "2"], ["experiment", acceptance_plan(folder, 2)]])
     target = folder / "out" if rng.random() < 0.5 else folder / "out" / "deeper"
     child = Child(*command, "--out", target, executable=program, prepare=as_nobody()).end({2})
     expect("Permission denied" in child.err, child.err)
@@ -263,7 +270,7 @@ def writing_command(rng, folder, out):
         ["compare", file, "--simulate", "--duration", "1s", "--out", out],
         ["run", file, "--duration", "200ms", "--preemption", "none", "--out", out],
         ["generate", "--count", "40", "--out", out],
-        ["experiment", "acceptance", "--utilization", "0.3,0.6", "--sets", "50", "--out", out],
+        ["experiment", acceptance_plan(folder, 50), "--out", out],
     ])
 
 
@@ -301,15 +308,14 @@ def full_disk(rng, folder):
         subprocess.run(["mount", "-o", "remount,size=50M", disk], check=True)
         Child(*arguments).end({0})
         Child(*arguments[:-1], folder / "elsewhere").end({0})
-        for name in ("acceptance.csv", "acceptance.svg"):
-            same = (disk / "out" / name).read_bytes() == (folder / "elsewhere" / name).read_bytes()
-            expect(same, f"{name} differs from that of an experiment that was not interrupted")
+        same = (disk / "out" / "results.csv").read_bytes() == (folder / "elsewhere" / "results.csv").read_bytes()
+        expect(same, "the results differ from those of an experiment that was not interrupted")
 
 
 def killed(rng, folder):
     """kill -9 during an experiment, several times: no unit is lost or counted twice."""
-    arguments = ["experiment", "acceptance", "--utilization", "0.2,0.5,0.8", "--sets", "60", "--seed",
-                 rng.randrange(1000), "--jobs", rng.randint(1, 3), "--out"]
+    plan = acceptance_plan(folder, 100, rng.randrange(1000))
+    arguments = ["experiment", plan, "--jobs", rng.randint(1, 3), "--out"]
     for _ in range(rng.randint(1, 4)):
         child = Child(*arguments, folder / "out")
         time.sleep(rng.uniform(0, 0.5))
@@ -317,8 +323,8 @@ def killed(rng, folder):
         child.end({0, -signal.SIGKILL})
     Child(*arguments, folder / "out").end({0})
     Child(*arguments, folder / "whole").end({0})
-    for name in ("acceptance.csv", "acceptance.svg"):
-        expect((folder / "out" / name).read_bytes() == (folder / "whole" / name).read_bytes(), f"{name} differs")
+    same = (folder / "out" / "results.csv").read_bytes() == (folder / "whole" / "results.csv").read_bytes()
+    expect(same, "the results differ from those of an experiment that was not killed")
 
 
 @functools.cache
@@ -338,7 +344,7 @@ def little_memory(rng, folder):
     command = rng.choice([["validate", file], ["simulate", file, "--duration", "5s", "--out", folder / "out"],
                           ["analyze", file], ["run", file, "--duration", "100ms", "--preemption", "none"],
                           ["generate", "--dags", "20000"], ["tune", "--judge", "bounds", SOURCE / "workloads" / "robot.yaml"],
-                          ["experiment", "acceptance", "--sets", "5", "--utilization", "0.5", "--out", folder / "out"]])
+                          ["experiment", acceptance_plan(folder, 5), "--out", folder / "out"]])
     # 127: the loader had no room for the program's libraries.
     child = Child(*command, prepare=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit))).end(GOOD | {127})
     check_results(folder)

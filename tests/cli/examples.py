@@ -31,18 +31,15 @@ RESULTS = {
     "results/os": [*ROBOT[:3], "cooperative", *ROBOT[4:]],
     "results/after": [*ROBOT, "--seed", "2"], "results/branch": [*ROBOT, "--seed", "3"],
     "results/cmp": ["compare", "workloads/robot.yaml", "--simulate", "--executors", "redag,mte", "--duration", "2s"],
-    "results/dags-1": ["experiment", "acceptance", "experiments/acceptance_dags.yaml", "--shard", "1/2"],
-    "results/dags-2": ["experiment", "acceptance", "experiments/acceptance_dags.yaml", "--shard", "2/2"],
 }
 TOOLS = {
     "sudo": '#!/bin/sh\nexec "$@"\n',
-    "sbatch": "#!/bin/sh\necho 1\n",  # tests/cli/slurm.py has a real one
     "ros2": "#!/bin/sh\nexit 1\n",
 }
 
 
 def commands():
-    """Returns every command: ["simulate"], ["experiment", "merge"], ..."""
+    """Returns every command: ["simulate"], ["analyze"], ..."""
     found = []
     for name in names_in(redag("--help").stdout):
         inner = names_in(redag(name, "--help").stdout)
@@ -81,17 +78,6 @@ class Examples(Case):
             return
         self.expect(redag(*RESULTS[place], "--out", place, cwd=self.folder), 0)
 
-    def recorded_beside_simulated(self):
-        """An experiment, and a run of ROS 2 nodes that belongs to it: a simulated one that says so."""
-        plan = self.write("plan.yaml", "experiment: factorial\nduration: 500ms\nrepetitions: 1\nworkloads: cart.yaml\n"
-                                       "executors: [ideal, mte]\n")
-        self.expect(redag("experiment", "factorial", plan, "--out", "results/simulated", cwd=self.folder), 0)
-        place = self.folder / "results" / "ros" / "mte" / "1"
-        self.expect(redag("simulate", self.cart, "--executor", "mte", "--duration", "500ms", "--seed", "1",
-                          "--events", "jsonl", "--out", place), 0)
-        events = place / "events.jsonl"
-        events.write_text(events.read_text().replace('"driver":"simulator"', '"driver":"ros_nodes"', 1))
-
     def killed_run(self):
         """A run that was killed while it recorded."""
         process = subprocess.Popen([PROGRAM, "run", self.cart, "--duration", "60s", "--out", "results/os"], cwd=self.folder,
@@ -128,10 +114,6 @@ class Examples(Case):
             length = CALIBRATION if name == "calibrate" else SHORT
             shorter = re.sub(r"--duration \S+", f"--duration {length}", example)
             example = shorter if shorter != example else re.sub(rf"(redag {name}(?: \S+\.yaml)?)", rf"\1 --duration {length}", example)
-        if command == ["experiment", "acceptance"] and ".yaml" not in example:
-            example += " --sets 1"
-        if command == ["experiment", "cost"]:
-            example = re.sub(r" --sample \S+", "", example) + " --sample 100ms"
         if "--affinity" in example:
             example = re.sub(r"--affinity \S+", f"--affinity {','.join(map(str, sorted(os.sched_getaffinity(0))[-2:]))}", example)
         if name == "top":
@@ -163,8 +145,6 @@ class Examples(Case):
             if command[0] == "recover" or f"--out {place}" in example:
                 continue
             self.make(place)
-        if "results/simulated" in example:
-            self.recorded_beside_simulated()
         if command[0] == "recover":
             self.killed_run()
         result = subprocess.run(["bash", "-c", f"set -o pipefail; {self.adapted(command, example)}"], cwd=self.folder,

@@ -29,7 +29,7 @@ BAD = {
     "CPUS": ["x", "1-", "99999", "-1"],
     "i/n": ["0/3", "4/3", "1/0", "x", "1/" + HUGE],
 }
-FREE = {("experiment acceptance", "--name")}  # accepts any name
+FREE = set()  # options that accept any name
 SEED = "--seed"
 # A sanitized program takes half a second to start, and the options share their code: a few of them will do there.
 STEP = 12 if SANITIZED else 1
@@ -45,7 +45,7 @@ class EveryOption(Case):
     """Tries the options that --help lists, which includes future ones."""
 
     def arguments(self, command):
-        if command in (["generate"], ["calibrate"], ["top"], ["experiment"], ["experiment", "acceptance"]):
+        if command in (["generate"], ["calibrate"], ["top"]):
             return []
         return [self.cart]
 
@@ -106,7 +106,7 @@ class Combinations(Case):
             self.refuse(command, self.cart, "--workers", "0", says="--workers: '0' is not a whole number from 1 to 4096")
             self.refuse(command, self.cart, "--workers", "-1", says="--workers: '-1' is not a whole number from 1 to 4096")
         self.refuse("compare", self.cart, "--repeat", "0", says="--repeat: '0' is not a whole number from 1 to 10000")
-        self.refuse("experiment", "acceptance", "--jobs", "100000", says="--jobs: '100000' is not a whole number from 1 to 1024")
+        self.refuse("experiment", self.cart, "--out", self.folder / "out", "--jobs", "100000", says="--jobs: '100000' is not a whole number from 1 to 1024")
         self.refuse("generate", "--count", "2", "--seed", str(2**64 - 1), "--out", self.folder / "out", says="last seed")
         self.refuse("compare", self.cart, "--simulate", "--repeat", "2", "--seed", str(2**64 - 1), says="last seed")
         self.refuse("tune", self.cart, "--seed", str(2**64 - 1), says="last seed")
@@ -170,8 +170,7 @@ class Files(Case):
     def test_what_is_no_file(self):
         for place in ("/dev/zero", "/nonexistent", self.folder / "empty"):
             (self.folder / "empty").mkdir(exist_ok=True)
-            for command in (["validate"], ["simulate"], ["analyze"], ["check-trace"], ["report"], ["experiment", "factorial"],
-                            ["experiment", "acceptance"], ["experiment", "merge", "--out", self.folder / "m"]):
+            for command in (["validate"], ["simulate"], ["analyze"], ["check-trace"], ["report"], ["experiment", "--out", self.folder / "m"]):
                 result = self.expect(self.limited(*command, place), 2, "error: ")
                 self.assertLess(len(result.stderr), 4000)
         self.assertFalse((self.folder / "m").exists())

@@ -125,10 +125,10 @@ class Tables(Case):
         self.agree("tune", "tune", self.long, "--duration", "200ms")
 
     def test_acceptance(self):
-        self.agree("acceptance", "experiment", "acceptance", self.write("acceptance.yaml", ACCEPTANCE))
+        self.agree("acceptance", "experiment", self.write("acceptance.yaml", ACCEPTANCE), "--out", "acceptance")
 
     def test_factorial(self):
-        self.agree("factorial", "experiment", "factorial", self.write("factorial.yaml", FACTORIAL))
+        self.agree("factorial", "experiment", self.write("factorial.yaml", FACTORIAL), "--out", "factorial")
 
     def test_a_terminal_tells_its_width(self):
         """A pseudo-terminal of 60 columns shows what COLUMNS=60 does."""

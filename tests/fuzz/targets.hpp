@@ -27,7 +27,7 @@ void kernel_record_target(std::string_view input);
 void jobs_csv_target(std::string_view input);
 /// Reads comparison.json beside recorded runs.
 void comparison_target(std::string_view input);
-/// Reads units.db of an experiment.
+/// Reads units.csv of an experiment.
 void units_target(std::string_view input);
 /// Reads the page of shared memory of `redag top`.
 void live_page_target(std::string_view input);

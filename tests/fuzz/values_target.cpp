@@ -9,7 +9,6 @@
 #include "redag/base/cpu_list.hpp"
 #include "redag/base/time.hpp"
 #include "redag/model/callback_match.hpp"
-#include "redag_lab/experiment/acceptance_plan.hpp"
 #include "tests/fuzz/targets.hpp"
 
 namespace redag::fuzz {
@@ -23,7 +22,6 @@ void values_target(std::string_view input) {
   if (const std::optional<std::vector<int>> cpus = parse_cpu_list(input)) {
     REDAG_CHECK(parse_cpu_list(format_cpu_list(*cpus)) == cpus, "a list of processors is read as it was written");
   }
-  (void)experiment::parse_utilization(input);
   (void)ros_name_mistake(input);
   const std::size_t half = input.size() / 2;
   (void)glob_match(input.substr(0, half), input.substr(half));

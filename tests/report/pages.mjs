@@ -8,9 +8,10 @@ import {pathToFileURL} from 'node:url';
 import {chromium} from 'playwright-core';
 
 export const FIGURES = {comparison: ['missed', 'p99', 'responses', 'lateness', 'timeline', 'schedule']};
-FIGURES.experiment = ['curves', 'distance', 'bounds', 'effects'];
+FIGURES.experiment = ['curves', 'distance', 'bounds'];
 FIGURES.worlds = ['curves', 'distance', 'worlds'];
 FIGURES.executors = ['worlds'];
+FIGURES.acceptance = ['curves'];
 FIGURES.single = FIGURES.perception = FIGURES.hostile = FIGURES.long = FIGURES.wide = FIGURES.comparison.slice(2);
 
 export const PHONE = {viewport: {width: 390, height: 844}, isMobile: true, hasTouch: true, deviceScaleFactor: 2};

@@ -42,7 +42,7 @@ async function violations(page) {
   return found.violations.flatMap(({id, nodes}) => nodes.slice(0, 4).map((node) => `${id}: ${node.html.slice(0, 140)}: ${node.failureSummary.split('\n')[1] || ''}`));
 }
 
-for (const name of ['comparison', 'single', 'perception', 'hostile', 'experiment', 'worlds']) {
+for (const name of ['comparison', 'single', 'perception', 'hostile', 'experiment', 'worlds', 'acceptance']) {
   await test(`${name}: axe-core finds nothing, in light and dark, on desktop and phone`, async () => {
     for (const [colorSchemes, options] of [[['light', 'dark'], {}], [['light'], PHONE]]) {
       const {page, close} = await open(name, options);
@@ -83,7 +83,7 @@ await test('colours: text has a contrast of 4.5:1, shapes of 3:1, and hues diffe
 });
 
 await test('headline: the verdict is the first heading, and says whether deadlines were met', async () => {
-  for (const [name, pattern] of [['comparison', /redag/], ['single', /deadline/], ['experiment', /on average: from/]]) {
+  for (const [name, pattern] of [['comparison', /redag/], ['single', /deadline/], ['experiment', /on average: from/], ['acceptance', /Accepted workloads, on average: from/]]) {
     const {page, close} = await open(name);
     assert.match(await page.locator('main h2').first().innerText(), pattern);
     assert.equal(await page.locator('main h2').first().getAttribute('id'), 'verdict');
@@ -164,7 +164,7 @@ await test('the worst jobs: all misses are listed or counted, and a key explains
 });
 
 await test('every figure has its data as a table', async () => {
-  for (const name of ['comparison', 'experiment', 'worlds']) {
+  for (const name of ['comparison', 'experiment', 'worlds', 'acceptance']) {
     const {page, problems, close} = await open(name);
     for (const figure of FIGURES[name]) {
       const data = page.locator(`figure[data-figure=${figure}] details.data`);

@@ -10,16 +10,13 @@
 #include "redag/base/text.hpp"
 #include "redag/trace/output_file.hpp"
 #include "redag/trace/recording.hpp"
-#include "redag_lab/cli/experiment/acceptance_page.hpp"
 #include "redag_lab/cli/run/recorded_runs.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/files.hpp"
+#include "redag_lab/cli/terminal/json.hpp"
 #include "redag_lab/cli/terminal/progress.hpp"
 #include "redag_lab/cli/terminal/signals.hpp"
-#include "redag_lab/experiment/acceptance_results.hpp"
-#include "redag_lab/experiment/folder.hpp"
 #include "redag_lab/report/document.hpp"
-#include "redag_lab/report/experiment.hpp"
 #include "redag_lab/report/page.hpp"
 #include "redag_lab/report/verdict.hpp"
 
@@ -160,80 +157,46 @@ class Reporting {
   std::vector<std::string> notes_;
 };
 
-// Writes the page of an experiment's folder, and says what it shows.
-int write_page(const ReportArguments &options, const fs::path &folder, const std::string &summary,
-               const std::string &html, Console &console) {
-  const std::string path = options.output.empty() ? (folder / "report.html").string() : options.output;
-  if (const Result<void> written = write_text(path, html); !written) {
-    console.note(written.error());
-    return kExitBad;
-  }
-  const std::string words = summary + "\n" + page_text(path, html);
-  if (options.json) {
-    console.note(words);
-  } else {
-    console.say(words);
-  }
-  return kExitOk;
-}
-
-// Reports the folder of a factorial experiment, which becomes one page.
-int report_factorial(const ReportArguments &options, const fs::path &file, Console &console) {
-  const Result<std::string> text = trace::read_file(file.string());
+// Writes the page of an experiment.
+int report_experiment(const ReportArguments &options, const std::string &file, Console &console) {
+  const Result<std::string> text = trace::read_file(file);
   if (!text) {
     console.note(text.error());
     return kExitBad;
   }
-  const Result<report::ExperimentDocument> document =
-      report::experiment_document(*text, file.string(), current_provenance());
-  if (!document) {
-    console.note(document.error());
+  const Json document = Json::parse(*text, nullptr, false);
+  if (!document.is_object() || document.value("format", "") != "redag.experiment/1") {
+    console.error(fmt::format("{}: is not a redag.experiment/1 document", file),
+                  "'redag experiment PLAN --out DIR' writes one");
     return kExitBad;
   }
   if (options.json) {
-    console.print(document->json + "\n");
+    console.print(*text);
     if (options.output.empty()) return kExitOk;
   }
-  return write_page(options, file.parent_path(), document->summary,
-                    report::page(document->json, document->title, report::PageKind::Experiment), console);
-}
-
-// Reports the folder of an acceptance experiment. Counts its units one by one, also those of a run that was killed.
-int report_acceptance(const ReportArguments &options, const std::string &folder, Console &console) {
-  const auto refuse = [&console](const Diagnostics &mistakes) {
-    console.note(mistakes);
+  const std::string name = document.value("name", "");
+  const std::string html = report::page(*text, name, report::PageKind::Experiment);
+  const std::string path =
+      options.output.empty() ? (fs::path(file).parent_path() / "report.html").string() : options.output;
+  if (const Result<void> written = write_text(path, html); !written) {
+    console.note(written.error());
     return kExitBad;
-  };
-  const Result<std::string> text = experiment::read_plan(folder);
-  if (!text) return refuse(text.error());
-  Result<experiment::AcceptancePlan> plan = experiment::parse_acceptance_plan(*text, folder + "/plan.yaml");
-  if (!plan) return refuse(plan.error());
-  const experiment::Acceptance acceptance(std::move(*plan));
-  experiment::AcceptanceCounter counter(acceptance);
-  const auto count = [&counter](std::uint64_t unit, const std::string &result) { return counter.add(unit, result); };
-  if (const Result<void> read = experiment::visit_units({folder}, *text, count); !read) return refuse(read.error());
-  const std::vector<std::string> runs = experiment::read_runs({folder});
-  if (options.json) {
-    console.print(to_json(acceptance, counter.results(), runs));
-    if (options.output.empty()) return kExitOk;
   }
-  const std::string summary =
-      fmt::format("{}: {} of {} workloads, {} violations", acceptance.plan().name, format_count(counter.results().done),
-                  format_count(counter.results().units), counter.results().violations.size());
-  return write_page(options, folder, summary, acceptance_page(acceptance, counter.results(), runs), console);
+  const std::string words =
+      fmt::format("{}: {} of {} {}\n{}", name, document.value("done", std::uint64_t{0}),
+                  document.value("units", std::uint64_t{0}), document.value("units_are", ""), page_text(path, html));
+  options.json ? console.note(words) : console.say(words);
+  return kExitOk;
 }
 
 int make_report(const ReportArguments &options, Console &console) {
   for (const std::string &place : options.places) {
     std::error_code ignored;
-    const fs::path factorial = fs::path(place) / "factorial.json";
-    const bool is_factorial = fs::exists(factorial, ignored);
-    if (!is_factorial && !fs::exists(fs::path(place) / "units.db", ignored)) continue;
-    if (options.places.size() > 1) {
-      console.error(fmt::format("{}: an experiment has a page of its own", place), "name this folder alone");
-      return kExitBad;
-    }
-    return is_factorial ? report_factorial(options, factorial, console) : report_acceptance(options, place, console);
+    const std::string file = (fs::path(place) / "results.json").string();
+    if (!fs::exists(file, ignored)) continue;
+    if (options.places.size() == 1) return report_experiment(options, file, console);
+    console.error(fmt::format("{}: an experiment has a page of its own", place), "name this folder alone");
+    return kExitBad;
   }
   return Reporting(options, console).run();
 }

@@ -105,41 +105,13 @@ bool is_result_name(std::string_view name) {
   if (const std::size_t at = name.rfind(".tmp."); at != std::string_view::npos && is_number(name.substr(at + 5))) {
     name = name.substr(0, at);
   }
-  constexpr std::array<std::string_view, 35> kNames = {"jobs.csv",
-                                                       "summary.json",
-                                                       "trace.pftrace",
-                                                       "trace.json",  // of earlier versions
-                                                       "events.redag",
-                                                       "events.jsonl",
-                                                       "workload.yaml",
-                                                       "comparison.json",
-                                                       "comparison.csv",
-                                                       "comparison.html",
-                                                       "report.html",
-                                                       "check.json",
-                                                       "plan.yaml",
-                                                       "units.db",
-                                                       "runs.jsonl",
-                                                       "acceptance.csv",
-                                                       "acceptance.json",
-                                                       "acceptance.svg",
-                                                       "factorial.csv",
-                                                       "factorial.json",
-                                                       "factorial.svg",
-                                                       "observations.csv",
-                                                       "response_quantiles.csv",
-                                                       "responses.svg",
-                                                       "distance.svg",
-                                                       "units.db-wal",
-                                                       "units.db-journal",
-                                                       "submit.sh",
-                                                       "shard.sbatch",
-                                                       "merge.sbatch",
-                                                       "shards",
-                                                       "merged",
-                                                       "logs",
-                                                       "kernel.jsonl",  // of earlier versions, as the next one
-                                                       "kernel.jsonl.gz"};
+  constexpr std::array<std::string_view, 17> kNames = {
+      "jobs.csv",        "summary.json",    "trace.pftrace",
+      "trace.json",  // of earlier versions
+      "events.redag",    "events.jsonl",    "workload.yaml", "comparison.json",
+      "comparison.csv",  "comparison.html", "report.html",   "check.json",
+      "kernel.jsonl",  // of earlier versions
+      "kernel.jsonl.gz", "units.csv",       "results.csv",   "results.json"};
   if (std::find(kNames.begin(), kNames.end(), name) != kNames.end()) return true;
   // Folders of a comparison (executors, and repetitions below them), and the files of `generate`.
   const std::vector<std::string> &executors = lab::variant_names();
@@ -149,6 +121,7 @@ bool is_result_name(std::string_view name) {
            name.substr(name.size() - suffix.size()) == suffix &&
            is_number(name.substr(prefix.size(), name.size() - prefix.size() - suffix.size()));
   };
+  if (name.starts_with("units-") && name.ends_with(".csv")) return true;  // of a share of an experiment
   return is_numbered("repetition-", "") || is_numbered("workload-", ".yaml") || is_numbered("violation-", ".yaml");
 }
 

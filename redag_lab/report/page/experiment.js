@@ -1,16 +1,27 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The page of a factorial experiment: executors over any factor at chosen levels of the others, a map of the bounds of
-// two DAGs, and the factors' effects.
+// The page of an experiment: executors, or methods of the analysis, over any factor at chosen levels of the others, and a
+// map of the bounds of two DAGs.
 
 const report = JSON.parse(document.getElementById('data').textContent);
-const {factors, points} = report;
-const EXECUTOR = 'executor';
+const {factors} = report;
+// Each level of the last factor has a line: executors, or methods.
+const EXECUTOR = factors[factors.length - 1].name;
+const isRuns = EXECUTOR === 'executor';
+// The rows of each combination, one for each DAG; the last one is of all DAGs together.
+const points = [];
+report.rows.forEach(({at, labels, counts, confidence, values}) => {
+  const [world, , dag] = isRuns ? labels : ['', '', 'total'];
+  const last = points[points.length - 1];
+  const key = JSON.stringify(at);
+  if (last === undefined || last.key !== key) points.push({key, at, worlds: isRuns ? [world] : [], dags: []});
+  points[points.length - 1].dags.push({name: dag, released: counts[0], missed: counts[1], confidence, values});
+});
 // The world of each executor. One experiment can have runs of several worlds, as executors "mte", "threads/mte",
 // "ros2/mte".
 const worldOf = new Map(factors.find(({name}) => name === EXECUTOR).levels.map((executor) => [executor,
-  (points.find(({at, worlds}) => at.executor === executor && worlds.length > 0) || {worlds: [report.world]}).worlds[0]]));
+  (points.find(({at, worlds}) => at[EXECUTOR] === executor && worlds.length > 0) || {worlds: []}).worlds[0]]));
 const worlds = Object.keys(WORLDS).filter((world) => [...worldOf.values()].includes(world));
 const plainName = (executor) => executor.slice(executor.indexOf('/') + 1);
 const label = (executor) => (worlds.length > 1 ? `${plainName(executor)}, ${WORLDS[worldOf.get(executor)]}` : executor);
@@ -23,6 +34,7 @@ const varied = factors.filter(({name, levels}) => name !== EXECUTOR && levels.le
 const pairs = (factors.find(({name}) => name === 'max_active') || {levels: []}).levels.filter((level) => /^\d+\+\d+$/.test(level));
 
 const METRICS = {
+  accepted_ratio: 'accepted',
   miss_ratio: 'missed: late, skipped or aborted',
   drop_ratio: 'skipped',
   excess_miss_ratio: 'missed above the ideal',
@@ -31,27 +43,27 @@ const METRICS = {
   response_p99_ns: 'p99 end to end',
   response_max_ns: 'longest end to end, of all runs',
   max_lateness_ns: 'largest lateness, of all runs',
-  deferred: 'deferred, of all jobs',
-  preemptions: 'preemptions per job',
   paper_miss_ratio: 'missed, counted as in the paper',
+  paper_startup_miss_ratio: 'missed, counted as in the paper with an early epoch',
+  paper_max_lateness_ns: 'largest lateness, counted as in the paper',
   finished_per_s: 'finished jobs per second',
   work: 'processors in use',
 };
 // Returns the reason why a figure is empty.
-const nothing = (metric) => (metric.startsWith('response_') ? 'A response time belongs to one DAG, end to end: choose a DAG. (A DAG that never finished has none.)'
+const nothing = (metric) => (!isRuns ? 'No method applies.' : metric.startsWith('response_') ? 'A response time belongs to one DAG, end to end: choose a DAG. (A DAG that never finished has none.)'
   : 'There is no data: the distance to the ideal needs runs of the executor "ideal" with the same workers and jobs.');
 const isTime = (metric) => metric.endsWith('_ns');
-const isShare = (metric) => metric.endsWith('_ratio') || metric === 'deferred';
+const isShare = (metric) => metric.endsWith('_ratio');
 const show = (metric, value) => (isTime(metric) ? formatTime(value) : isShare(metric) ? formatPercent(value) : String(value));
 const words = (name) => name.replaceAll('_', ' ');
 
 // The reader's choice: a level of each factor, the factor along the axis, a metric, a DAG, and the executor of the map.
-const state = {x: Math.max(0, varied.findIndex(({name}) => name !== 'workload')), metric: 'miss_ratio', dag: 'total', levels: {}, owner: 0};
+const state = {x: Math.max(0, varied.findIndex(({name}) => (isRuns ? name !== 'workload' : name === 'utilization'))), metric: report.figures[0], dag: 'total', levels: {}, owner: 0};
 varied.forEach(({name, levels}) => { state.levels[name] = levels.includes('unbounded') ? 'unbounded' : levels[levels.length > 2 ? Math.floor(levels.length / 2) : 0]; });
 
 const byPlace = new Map(points.map((point) => [factors.map(({name}) => point.at[name] ?? '').join('\n'), point]));
 // The factors that affect each executor. Other factors are not in the places of its points.
-const knows = new Map(executors.map((executor) => [executor, new Set(points.filter((point) => point.at.executor === executor)
+const knows = new Map(executors.map((executor) => [executor, new Set(points.filter((point) => point.at[EXECUTOR] === executor)
   .flatMap((point) => Object.keys(point.at)))]));
 
 /**
@@ -70,7 +82,7 @@ function dagAt(executor, other = {}) {
 /** Returns [median, low, high] of the metric; for a maximum [largest of all runs, least, largest]. */
 function spreadAt(executor, metric, other = {}) {
   const dag = dagAt(executor, other);
-  return dag === null ? null : dag.values[report.metrics.indexOf(metric)];
+  return dag === null ? null : dag.values[report.figures.indexOf(metric)];
 }
 
 const where = (skip) => varied.filter(({name}) => !skip.includes(name)).map(({name}) => `${words(name)} ${state.levels[name]}`).join(', ');
@@ -79,7 +91,7 @@ const where = (skip) => varied.filter(({name}) => !skip.includes(name)).map(({na
 function spreadTable(first, metric, rows) {
   const number = (value) => ({text: show(metric, value), sort: value});
   return {
-    columns: [column(first), column('executor', '', true), column(METRICS[metric]), column('least'), column('most')],
+    columns: [column(first), column(EXECUTOR, '', true), column(METRICS[metric]), column('least'), column('most')],
     rows: rows.filter(([, , spread]) => spread).map(([at, name, spread]) => ({cells: [{text: at, sort: Number.isNaN(Number(at)) ? at : Number(at)}, name, ...spread.map(number)]})),
   };
 }
@@ -257,83 +269,44 @@ function boundsFigure() {
   return {figure: self, owners, note};
 }
 
-/** Draws the share of the variation that each factor explains, with a bar for each executor and workload. */
-function effectsFigure() {
-  const name = (term) => term.factors.map(words).join(' \u00d7 ');
-  const shown = report.effects.filter(({variance}) => variance > 0);
-  const terms = [...new Set(shown.flatMap(({shares}) => shares.map(name)))];
-  return figure({
-    name: 'effects', height: 140 + 34 * Math.max(1, shown.length), label: 'Shares of the variation that each factor explains',
-    data: () => ({
-      columns: [column('executor'), column('workload', '', true), column('explained by', '', true), column('share')],
-      rows: shown.flatMap((one) => [...one.shares.map((share) => [name(share), share.share]), ['three or more', one.higher_interactions], ['chance', one.noise]]
-        .map(([term, share]) => ({cells: [label(one.executor), one.workload, term, {text: formatPercent(share), sort: share}]}))),
-    }),
-    caption: 'Shares of the variation of the miss ratio over all runs of an executor: explained by one factor alone, by pairs of factors '
-      + 'together (\u00d7), by three or more factors, and by chance.',
-    build(t) {
-      if (shown.length === 0) return report.complete ? 'The miss ratio is the same everywhere.' : 'The effects are available once all runs are done.';
-      const rows = shown.map(({workload, executor}) => (new Set(shown.map((one) => one.workload)).size > 1 ? `${label(executor)}, ${workload}` : label(executor)));
-      const value = (one, term) => (one.shares.find((share) => name(share) === term) || {share: 0}).share;
-      const stack = (label, data, i) => ({type: 'bar', stack: 'all', name: label, data, itemStyle: fillOf(t, shadeOf(t, i)), barMaxWidth: 22});
-      return {
-        grid: {left: 8, right: 16, top: 82, bottom: 8, containLabel: true},
-        legend: {type: 'plain', right: 90},
-        tooltip: {trigger: 'item', formatter: (item) => tip([item.name, item.seriesName, formatPercent(item.value)])},
-        xAxis: {type: 'value', min: 0, max: 1, axisLabel: {formatter: (share) => `${Math.round(100 * share)} %`}},
-        yAxis: {type: 'category', inverse: true, data: rows, axisLabel: {color: t.ink}},
-        series: [
-          ...terms.map((term, i) => stack(term, shown.map((one) => value(one, term)), i)),
-          stack('three or more', shown.map((one) => one.higher_interactions), terms.length),
-          stack('chance', shown.map((one) => one.noise), terms.length + 1),
-        ],
-      };
-    },
-  });
+/** Returns the share of missed jobs, or of accepted workloads, at each combination. */
+function sharesOf(executor, workload) {
+  return points.filter(({at}) => at[EXECUTOR] === executor && (workload === undefined || at.workload === workload))
+    .map(({dags}) => dags[dags.length - 1]).map((all) => all.missed / Math.max(1, all.released));
 }
 
-/** Returns the mean share of missed jobs of each executor but the ideal one, over all combinations; the best first. */
+/** Returns the mean of these shares of each executor but the ideal one, or of each method; the least first. */
 function meanMisses() {
   return executors.filter((executor) => plainName(executor) !== 'ideal').map((executor) => {
-    const shares = points.filter(({at, dags}) => at.executor === executor && dags.length > 0).map(({dags}) => dags[dags.length - 1])
-      .map((all) => all.missed / Math.max(1, all.released));
+    const shares = sharesOf(executor);
     return {name: label(executor), mean: shares.reduce((a, b) => a + b, 0) / shares.length, any: shares.length > 0};
   }).filter(({any}) => any).sort((a, b) => a.mean - b.mean);
 }
 
 function headlineOf() {
-  if (report.violations > 0) return {tone: 'bad', text: `The trace checker found ${formatCount(report.violations)} violations of the model`};
+  const bad = report.remarks.find(({good}) => !good);
+  if (bad) return {tone: 'bad', text: bad.text};
   const means = meanMisses();
-  if (means.length === 0) return {tone: 'caution', text: 'No run is done'};
+  if (means.length === 0) return {tone: 'caution', text: 'No unit is done'};
   const [best] = means;
   const worst = means[means.length - 1];
   const of = ({name, mean}) => `${name} ${formatPercent(mean)}`;
-  if (worst.mean === 0) return {tone: 'good', text: 'No deadline was missed'};
-  if (means.length === 1) return {tone: 'plain', text: `Missed deadlines, on average: ${of(best)}`};
-  return {tone: 'plain', text: `Missed deadlines, on average: from ${of(best)} to ${of(worst)}`};
+  if (isRuns && worst.mean === 0) return {tone: 'good', text: 'No deadline was missed'};
+  const what = isRuns ? 'Missed deadlines' : 'Accepted workloads';
+  return {tone: 'plain', text: `${what}, on average: ${means.length === 1 ? of(best) : `from ${of(best)} to ${of(worst)}`}`};
 }
 
 function verdict() {
-  const list = [];
-  const say = (tone, text) => list.push({tone, text});
-  if (report.violations > 0) say('bad', `The trace checker found ${formatCount(report.violations)} violations of the model.`);
-  else say('good', `${formatCount(report.done)} runs, ${formatCount(report.checks)} checks of their traces: no violation of the model.`);
-  if (report.runs_beyond_max_active > 0) say('bad', `max_active was exceeded in ${formatCount(report.runs_beyond_max_active)} runs.`);
-  else if (pairs.length > 0 || points.some(({at}) => at.max_active)) say('good', 'No run exceeded max_active.');
-  if (!report.complete) say('caution', `${formatCount(report.done)} of ${formatCount(report.units)} runs are done.`);
-  factors.find(({name}) => name === 'workload').levels.forEach((workload) => {
-    const missed = (executor) => {
-      const misses = points.filter(({at, dags}) => at.executor === executor && at.workload === workload && dags.length > 0)
-        .map(({dags}) => dags[dags.length - 1]).map((all) => all.missed / Math.max(1, all.released));
-      if (misses.length === 0) return null;
-      const mean = misses.reduce((a, b) => a + b, 0) / misses.length;
-      return `${plainName(executor)} ${formatPercent(mean)}${misses.length > 1 ? ` (${formatPercent(Math.min(...misses))} to ${formatPercent(Math.max(...misses))})` : ''}`;
-    };
-    const parts = byWorld(executors).map(({world, names}) => {
-      const list = names.map(missed).filter((part) => part !== null).join(', ');
-      return list === '' ? null : `${worlds.length > 1 ? `${DRIVERS[world]} ` : ''}${list}`;
+  const list = report.remarks.map(({good, text}) => ({tone: good ? 'good' : 'bad', text}));
+  if (!report.complete) list.push({tone: 'caution', text: `${formatCount(report.done)} of ${formatCount(report.units)} ${report.units_are} are done.`});
+  (isRuns ? factors.find(({name}) => name === 'workload').levels : []).forEach((workload) => {
+    const parts = executors.map((executor) => {
+      const shares = sharesOf(executor, workload);
+      if (shares.length === 0) return null;
+      const mean = shares.reduce((a, b) => a + b, 0) / shares.length;
+      return `${label(executor)} ${formatPercent(mean)}${shares.length > 1 ? ` (${formatPercent(Math.min(...shares))} to ${formatPercent(Math.max(...shares))})` : ''}`;
     }).filter((part) => part !== null);
-    say('plain', `${workload}: missed${varied.length > 1 ? ', mean over all combinations' : ''}: ${parts.join('; ')}.`);
+    list.push({tone: 'plain', text: `${workload}: missed${varied.length > 1 ? ', mean over all combinations' : ''}: ${parts.join('; ')}.`});
   });
   return list;
 }
@@ -341,25 +314,25 @@ function verdict() {
 function selectionTable() {
   const factor = varied[state.x];
   const levels = factor === undefined ? [''] : factor.levels;
-  const shownMetrics = ['miss_ratio', 'drop_ratio', 'excess_miss_ratio', 'paper_miss_ratio', 'response_p50_ns', 'response_p99_ns', 'max_lateness_ns'];
+  const shownMetrics = !isRuns ? report.figures : ['miss_ratio', 'drop_ratio', 'excess_miss_ratio', 'paper_miss_ratio', 'response_p50_ns', 'response_p99_ns', 'max_lateness_ns'];
   const inWorlds = worlds.length > 1 ? [column('world', '', true)] : [];
-  const columns = [...(factor ? [column(words(factor.name)), column('executor', '', true)] : [column('executor')]), ...inWorlds, ...shownMetrics.map((metric) => column(METRICS[metric]))];
+  const columns = [...(factor ? [column(words(factor.name)), column(EXECUTOR, '', true)] : [column(EXECUTOR)]), ...inWorlds, ...shownMetrics.map((metric) => column(METRICS[metric]))];
   const rows = [];
   levels.forEach((level) => {
     let first = true;
     executors.forEach((executor) => {
       const spread = (metric) => spreadAt(executor, metric, factor ? {[factor.name]: level} : {});
-      if (spread('miss_ratio') === null) return;
+      if (spread(shownMetrics[0]) === null) return;
       const at = factor ? [{text: level, sort: Number.isNaN(Number(level)) ? level : Number(level), kind: first ? '' : 'again'}] : [];
       rows.push({first, cells: [...at, plainName(executor), ...(worlds.length > 1 ? [WORLDS[worldOf.get(executor)]] : []), ...shownMetrics.map((metric) => {
         const value = spread(metric);
         if (value === null) return {text: '\u2013', sort: null};
         const range = `${show(metric, value[1])} to ${show(metric, value[2])}`;
-        if (metric !== 'miss_ratio') return {text: show(metric, value[0]), sort: value[0], title: range};
+        if (metric !== shownMetrics[0]) return {text: show(metric, value[0]), sort: value[0], title: range};
         // If most runs missed nothing, the median hides the misses of the others.
         const {missed, released} = dagAt(executor, factor ? {[factor.name]: level} : {});
         const counted = `${formatCount(missed)} of ${formatCount(released)}`;
-        return {text: value[0] === 0 && missed > 0 ? counted : show(metric, value[0]), sort: value[0], title: `${range}; ${counted} in all runs`, kind: missed > 0 ? 'missed' : ''};
+        return {text: value[0] === 0 && missed > 0 ? counted : show(metric, value[0]), sort: value[0], title: `${range}; ${counted} in all ${report.units_are}`, kind: isRuns && missed > 0 ? 'missed' : ''};
       })]});
       first = false;
     });
@@ -368,15 +341,12 @@ function selectionTable() {
 }
 
 function howItWasRun() {
-  const machines = [...new Set(report.runs.filter(({machine}) => machine).map(({machine, jobs, version}) =>
-    [machine.model, `${machine.cpus} processors`, machine.kernel, `redag ${version}`, `${jobs} at once`].filter(Boolean).join(', ')))];
-  const worldRows = worlds.length > 1 ? byWorld(executors).map(({world, names}) => [WORLDS[world], `${names.map(plainName).join(', ')} ${DRIVERS[world]}`])
-    : [['World', DRIVERS[worlds[0]]]];
+  const worldRows = byWorld(executors).map(({world, names}) => (worlds.length > 1 ? [WORLDS[world], `${names.map(plainName).join(', ')} ${DRIVERS[world]}`]
+    : ['World', DRIVERS[world]]));
   return [
-    heading(2, 'how', 'How the runs were made'),
-    element('dl', {}, ...[...worldRows, ['Length of a run', formatTime(report.duration_ns)],
-      ['Runs per combination', String(report.repetitions)], ['Combinations', formatCount(points.length)], ['Machine', machines.join('; ') || 'not recorded'],
-      ...provenanceRows(report.results_provenance),
+    heading(2, 'how', `How the ${report.units_are} were made`),
+    element('dl', {}, ...[...worldRows, ['Combinations', formatCount(points.length)],
+      ...provenanceRows(report.provenance),
     ].flatMap(([name, value]) => [element('dt', {}, name), element('dd', {}, value)])),
     element('details', {}, element('summary', {}, 'The plan'), element('pre', {tabindex: '0'}, report.plan)),
     pageFooter(report),
@@ -387,11 +357,10 @@ const intervals = 'Bars: confidence interval of the median over the repetitions 
   + 'for a maximum, which is that of all runs, from the smallest to the largest run.';
 const bars = worlds.length > 1 || varied.length === 0 ? worldsFigure() : null;
 const curves = curvesFigure('curves', () => state.metric, `Medians at the chosen levels. ${intervals}`);
-const distance = curvesFigure('distance', () => 'excess_miss_ratio', 'Missed deadlines above those of the ideal (preemptive, no overhead, no bounds, in virtual '
+const hasIdeal = plainNames.includes('ideal');
+const distance = !hasIdeal ? null : curvesFigure('distance', () => 'excess_miss_ratio', 'Missed deadlines above those of the ideal (preemptive, no overhead, no bounds, in virtual '
   + `time) on the same jobs. Values below 0 are better than the ideal; this is possible, because a rate-monotonic order is not optimal. ${intervals}`);
 const map = boundsFigure();  // not drawn while hidden, with a width of 0
-// A single factor explains everything.
-const effects = varied.filter(({name}) => name !== 'workload').length > 1 ? effectsFigure() : null;
 
 function redraw() {
   refill();
@@ -402,18 +371,18 @@ const levelChoice = ({name, levels}) => dropdown(words(name), levels, levels.ind
   (i) => { state.levels[name] = levels[i]; redraw(); });
 const controls = filled(() => element('div.row.controls', {},
   varied.length > 1 ? dropdown('over', varied.map(({name}) => words(name)), state.x, (i) => { state.x = i; redraw(); }) : null,
-  dropdown('of', report.metrics.map((metric) => METRICS[metric]), report.metrics.indexOf(state.metric), (i) => { state.metric = report.metrics[i]; redraw(); }),
-  dropdown('DAG', dagNames, dagNames.indexOf(state.dag), (i) => { state.dag = dagNames[i]; redraw(); }),
+  report.figures.length < 2 ? null : dropdown('of', report.figures.map((metric) => METRICS[metric]), report.figures.indexOf(state.metric), (i) => { state.metric = report.figures[i]; redraw(); }),
+  dagNames.length < 2 ? null : dropdown('DAG', dagNames, dagNames.indexOf(state.dag), (i) => { state.dag = dagNames[i]; redraw(); }),
   ...varied.filter((factor, i) => i !== state.x).map(levelChoice)));
 
 startPage([
   element('div.head', {}, element('h1', {}, report.name), element('div.controls', {}, themeChoice())),
-  element('p.facts', {}, [plainNames.join(', '), worlds.map((world) => DRIVERS[world]).join(', '), `${formatCount(report.done)} runs of ${formatTime(report.duration_ns)}`].join(' \u00b7 ')),
+  element('p.facts', {}, [plainNames.join(', '), worlds.map((world) => DRIVERS[world]).join(', '), `${formatCount(report.done)} ${report.units_are}`].filter((part) => part !== '').join(' \u00b7 ')),
   headline(headlineOf()), verdictList(verdict()),
-  element('details', {}, element('summary', {}, 'Colours and lines'), filled(() => colourKey('executor', 'world, or factor'))),
-  heading(2, 'curves', varied.length > 0 ? 'Over one factor' : 'Executors side by side'), controls,
+  element('details', {}, element('summary', {}, 'Colours and lines'), filled(() => colourKey(EXECUTOR, 'world, or factor'))),
+  heading(2, 'curves', varied.length > 0 ? 'Over one factor' : `The ${words(EXECUTOR)}s side by side`), controls,
   ...(varied.length > 0 ? [filled(() => element('p.soft', {}, where([varied[state.x].name]))), curves.box,
-    heading(3, 'distance', 'Distance to the ideal'), distance.box, filled(selectionTable)] : []),
+    ...(hasIdeal ? [heading(3, 'distance', 'Distance to the ideal'), distance.box] : []), filled(selectionTable)] : []),
   ...(bars === null ? [] : [worlds.length > 1 ? heading(2, 'worlds', 'Comparison of worlds') : null,
     varied.length > 0 ? filled(() => element('div.row.controls', {}, levelChoice(varied[state.x]))) : null,
     varied.length > 0 ? filled(() => element('p.soft', {}, where([]))) : null, bars.box]),
@@ -421,6 +390,5 @@ startPage([
   ...(pairs.length > 0 ? [heading(2, 'bounds', 'Bounds on two DAGs'),
     map.owners.length > 1 ? element('div.row.controls', {}, choice('Executor', map.owners.map(label), 0, (i) => { state.owner = i; map.figure.draw(); })) : null,
     filled(() => element('p.soft', {}, where(['max_active']))), map.note, map.figure.box] : []),
-  ...(effects !== null ? [heading(2, 'effects', 'What explains the differences'), effects.box] : []),
   ...howItWasRun(),
 ]);
