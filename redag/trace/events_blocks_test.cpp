@@ -27,10 +27,7 @@ namespace fs = std::filesystem;
 
 class EventsBlocks : public ::testing::Test {
  protected:
-  void TearDown() override {
-    fs::remove(path_);
-    fs::remove(path_ + ".jsonl");
-  }
+  void TearDown() override { fs::remove(path_); }
 
   static Trace trace_of(std::size_t events) {
     Trace trace;
@@ -99,17 +96,6 @@ TEST_F(EventsBlocks, AllEventsAreReadBackBlockByBlock) {
     }
     EXPECT_FALSE(reader->next(some).value()) << "the end remains the end";
   }
-}
-
-TEST_F(EventsBlocks, HoldTheSameAsText) {
-  const Trace trace = trace_of(100'000);
-  written(trace);
-  ASSERT_TRUE(write_trace(path_ + ".jsonl", trace));
-  const Trace blocks = read_trace(path_).value();
-  const Trace text = read_trace(path_ + ".jsonl").value();
-  EXPECT_TRUE(blocks.events == text.events);
-  EXPECT_EQ(run_info_to_json(blocks.info), run_info_to_json(text.info));
-  EXPECT_LT(fs::file_size(path_), fs::file_size(path_ + ".jsonl") / 5);
 }
 
 // No change of any byte, and no cut, is taken for a trace; the message says where.

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Files of events, the lossless form of a trace: events.redag (compressed blocks) and events.jsonl (a line for each
-// event). Both describe the run first, and end with a proof that nothing is missing. Readers know a file's form by its
-// first bytes. Neither side holds more than one block of events. See docs/results_format.md. Not thread-safe.
+// Files of events (events.redag), the lossless form of a trace: blocks of compressed bytes, each with a checksum. The
+// first block describes the run. The last one proves that none is missing; it has a fixed length, and a reader finds it
+// from the end. Neither side holds more than one block of events. See docs/results_format.md. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -19,18 +19,15 @@
 
 namespace redag::trace {
 
-class EventsSink;
-class EventsSource;
+class InputFile;
 
-/// The names of the files in a folder of results.
+/// The name of the file in a folder of results.
 inline constexpr std::string_view kEventsFile = "events.redag";
-inline constexpr std::string_view kEventsTextFile = "events.jsonl";
 
 /// Writes events as they arrive, for runs that are too long to be kept in memory.
 class EventsWriter {
  public:
-  /// A path that ends in ".redag" gets blocks, any other one text. `info.end` and `info.lost_events` may still be
-  /// unknown. Errors: an invalid workload, an unwritable place.
+  /// `info.end` and `info.lost_events` may still be unknown. Errors: an invalid workload, an unwritable place.
   [[nodiscard]] static Result<EventsWriter> create(const std::string &path, const RunInfo &info);
 
   EventsWriter(EventsWriter &&) noexcept;
@@ -46,14 +43,15 @@ class EventsWriter {
   [[nodiscard]] Result<void> commit(Time end, std::uint64_t lost_events);
 
  private:
-  explicit EventsWriter(std::unique_ptr<EventsSink> sink);
-  std::unique_ptr<EventsSink> sink_;
+  class Impl;
+  explicit EventsWriter(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
 };
 
-/// Reads a file of either form, some events at a time.
+/// Reads a file of events, a block at a time.
 class EventsReader {
  public:
-  /// Reads the description of the run. Errors name file and line, or file and byte. A file without its end (an
+  /// Reads the description of the run. Errors name file and byte. A file without its end (an
   /// incomplete copy) is an error.
   [[nodiscard]] static Result<EventsReader> open(const std::string &path);
   /// The same for bytes in memory, which must outlive the reader; `file` is their name in errors.
@@ -79,10 +77,11 @@ class EventsReader {
   void rewind();
 
  private:
-  explicit EventsReader(std::unique_ptr<EventsSource> source);
-  [[nodiscard]] static Result<EventsReader> make(Result<std::unique_ptr<EventsSource>> source);
+  class Impl;
+  explicit EventsReader(std::unique_ptr<Impl> impl);
+  [[nodiscard]] static Result<EventsReader> make(InputFile file);
 
-  std::unique_ptr<EventsSource> source_;
+  std::unique_ptr<Impl> impl_;
 };
 
 /// The most events of a trace in memory, at 32 bytes each. EventsReader reads longer files.
@@ -95,10 +94,5 @@ inline constexpr std::uint64_t kMostEventsInMemory = std::uint64_t{1} << 28U;
 
 /// The same for bytes in memory; `file` is their name in errors.
 [[nodiscard]] Result<Trace> parse_trace(std::string_view bytes, const std::string &file);
-
-/// The lines of events.jsonl: the first one, one for each event, the last one.
-[[nodiscard]] std::string events_header(const RunInfo &info);
-void append_event_line(const JobEvent &event, std::string &out);
-[[nodiscard]] std::string events_footer(std::uint64_t events, Time end, std::uint64_t lost_events);
 
 }  // namespace redag::trace

@@ -51,7 +51,7 @@ RecordedRun recorded(std::uint64_t seed, Duration duration = kSecond, Duration w
   trace::Trace trace = simulated(std::move(workload), "mte", seed, duration);
   trace.info.driver = trace::Driver::RosNodes;
   trace.info.config.workers = 5;  // threads that executed callbacks
-  return record("a/events.jsonl", trace, plan());
+  return record("a/events.redag", trace, plan());
 }
 
 Result<FinishedRun> drive(const PlannedRun &planned) {

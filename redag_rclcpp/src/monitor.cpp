@@ -328,7 +328,7 @@ redag::Result<void> Monitor::Impl::finish() {
   if (has_trace) {
     write_metrics(options_.trace + "/metrics.json");
     using redag::metrics::Picture;
-    redag::metrics::FilesOptions files{.folder = options_.trace, .events_as_text = options_.events_as_text};
+    redag::metrics::FilesOptions files{.folder = options_.trace};
     if (options_.picture) files.picture = *options_.picture ? Picture::Always : Picture::Never;
     const redag::Diagnostics more = keeper_.write(files, executor_);
     problems.insert(problems.end(), more.begin(), more.end());

@@ -294,19 +294,16 @@ TEST_F(MonitorTest, ATraceThatIsTooLongEndsEarlier) {
   options_.trace_capacity = 1 << 14;
   monitor_options_.trace = folder_ / "results";
   monitor_options_.trace_events = 25;
-  monitor_options_.events_as_text = true;
   monitor_options_.picture = false;
   add_timer(10ms, [] {});
   start();
   ASSERT_TRUE(eventually([] { return LogCapture::warnings_with("the trace ends here, after 25 events") == 1; }));
   stop();
   ASSERT_TRUE(monitor_->finish());
-  const auto trace = redag::trace::read_trace(folder_ / "results" / "events.jsonl");
+  const auto trace = redag::trace::read_trace(folder_ / "results" / "events.redag");
   ASSERT_TRUE(trace) << to_string(trace.error());
   EXPECT_EQ(trace->events.size(), 25U);
-  for (const char *name : {"events.redag", "trace.pftrace"}) {
-    EXPECT_FALSE(std::filesystem::exists(folder_ / "results" / name)) << name;
-  }
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "results" / "trace.pftrace"));
   EXPECT_EQ(trace->info.end, trace->events.back().time);
 }
 

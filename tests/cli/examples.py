@@ -17,7 +17,7 @@ import subprocess
 import time
 import unittest
 
-from program import CART, PROGRAM, SOURCE, Case, main, redag
+from program import CART, PROGRAM, SOURCE, Case, changed_run, main, redag
 
 SHORT = "500ms"       # of a run in real time
 CALIBRATION = "10s"  # everything is measured once, on a busy machine too
@@ -88,9 +88,9 @@ class Examples(Case):
         self.expect(redag("experiment", "factorial", plan, "--out", "results/simulated", cwd=self.folder), 0)
         place = self.folder / "results" / "ros" / "mte" / "1"
         self.expect(redag("simulate", self.cart, "--executor", "mte", "--duration", "500ms", "--seed", "1",
-                          "--events", "jsonl", "--out", place), 0)
-        events = place / "events.jsonl"
-        events.write_text(events.read_text().replace('"driver":"simulator"', '"driver":"ros_nodes"', 1))
+                          "--out", place), 0)
+        events = place / "events.redag"
+        events.write_bytes(changed_run(events.read_bytes(), '"driver":"simulator"', '"driver":"ros_nodes"'))
 
     def killed_run(self):
         """A run that was killed while it recorded."""

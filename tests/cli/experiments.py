@@ -17,7 +17,7 @@ import subprocess
 import unittest
 import xml.etree.ElementTree
 
-from program import CART, PROGRAM, SANITIZED, SOURCE, Case, in_terminal, interrupt, main, redag, units,\
+from program import CART, PROGRAM, SANITIZED, SOURCE, Case, changed_run, in_terminal, interrupt, main, redag, units,\
     wait_for_units
 
 PLAN = """\
@@ -401,7 +401,7 @@ class Factorial(Case):
                           "workloads: cart.yaml\nexecutors: [ideal, redag-none, mte, ste]\n")
         program = self.write("run_workload", f"""#!/bin/sh
 executor=${{2#--executor=}} duration=${{3#--duration=}} warm_up=${{4#--warm-up=}} seed=${{5#--seed=}} out=${{6#--out=}}
-exec "{PROGRAM}" simulate "$1" --executor "$executor" --duration "$duration" --warm-up "$warm_up" --seed "$seed" --events jsonl --out "$out"
+exec "{PROGRAM}" simulate "$1" --executor "$executor" --duration "$duration" --warm-up "$warm_up" --seed "$seed" --out "$out"
 """)
         program.chmod(0o755)
         self.run_plan(plan, "ros2", "--run-workload", program)
@@ -421,9 +421,9 @@ exec "{PROGRAM}" simulate "$1" --executor "$executor" --duration "$duration" --w
         for run in ("1", "2"):
             place = self.folder / "recorded" / "mte" / run
             self.expect(redag("simulate", cart, "--executor", "mte", "--duration", "500ms", "--seed", run,
-                              "--events", "jsonl", "--out", place), 0)
-            events = place / "events.jsonl"
-            events.write_text(events.read_text().replace('"driver":"simulator"', '"driver":"ros_nodes"', 1))
+                              "--out", place), 0)
+            events = place / "events.redag"
+            events.write_bytes(changed_run(events.read_bytes(), '"driver":"simulator"', '"driver":"ros_nodes"'))
         both = ("experiment", "merge", self.folder / "simulated", self.folder / "recorded")
         self.expect(redag(*both, "--out", self.folder / "both"), 0)
         rows = {(row["executor"], row["world"]) for row in csv.DictReader(self.results("both")[1].splitlines())}

@@ -102,8 +102,7 @@ class Checking {
 
 Action add_check_trace(CLI::App &app) {
   auto options = std::make_shared<CheckTraceOptions>();
-  app.add_option("PLACE", options->places,
-                 "Traces (events.redag, events.jsonl), or folders that hold traces at any depth")
+  app.add_option("PLACE", options->places, "Traces (events.redag), or folders that hold traces at any depth")
       ->type_name("RESULT")
       ->required();
   app.add_flag("--json", options->json, "Write the verdicts as one JSON document");

@@ -15,7 +15,7 @@ namespace redag::cli {
 /// Repetitions of one run, such as `<place>/mte/repetition-1` and `<place>/mte/repetition-2`, or a single run.
 struct RecordedRuns {
   std::string label;                // shortest unique end of the path: "mte", "before/mte"
-  std::vector<std::string> traces;  // paths of events.jsonl
+  std::vector<std::string> traces;  // paths of events.redag
 };
 
 struct RecordedPlaces {
@@ -24,7 +24,7 @@ struct RecordedPlaces {
   [[nodiscard]] std::size_t traces() const;
 };
 
-/// Searches `places`: folders, or events.jsonl files. A run found twice counts once. Errors: a place without a trace,
+/// Searches `places`: folders, or events.redag files. A run found twice counts once. Errors: a place without a trace,
 /// or a malformed comparison.json.
 [[nodiscard]] Result<RecordedPlaces> find_recorded_runs(const std::vector<std::string> &places);
 

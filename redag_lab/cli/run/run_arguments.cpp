@@ -87,11 +87,6 @@ void add_result_arguments(CLI::App &app, RunArguments &arguments) {
   add_count(app, "--max-events", arguments.max_events, {1, kMaxEvents},
             "Number of events to check and write; later events count in the summary only")
       ->group(kResultGroup);
-  const Choices<bool> forms{{"redag", false}, {"jsonl", true}};
-  add_choice(app, "--events", arguments.events_as_text, forms,
-             "Form of the events: events.redag (compressed), or events.jsonl (text)")
-      ->needs(folder)
-      ->group(kResultGroup);
   const Choices<bool> writes{{"always", true}, {"never", false}};
   add_choice(app, "--jobs", arguments.jobs, writes, "Write jobs.csv, a row for each job, most of a long run's results")
       ->needs(folder)
@@ -305,10 +300,7 @@ std::optional<lab::SessionOptions> session_options(const RunArguments &arguments
 }
 
 metrics::FilesOptions files_options(const RunArguments &arguments, const std::string &folder) {
-  return {.folder = folder,
-          .events_as_text = arguments.events_as_text,
-          .jobs = arguments.jobs,
-          .picture = arguments.picture};
+  return {.folder = folder, .jobs = arguments.jobs, .picture = arguments.picture};
 }
 
 lab::ProgressHook progress_hook(Progress &progress, const Workload &workload, Duration duration) {

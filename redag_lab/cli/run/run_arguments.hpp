@@ -42,7 +42,6 @@ struct RunArguments {
   bool live = false;
   bool json = false;
   std::string folder;
-  bool events_as_text = false;
   bool jobs = true;
   metrics::Picture picture = metrics::Picture::Auto;
   bool flight = false;  // records the run in `folder` while it runs

@@ -79,10 +79,6 @@ Result<std::vector<std::string>> find_traces(const std::string &place) {
   fs::recursive_directory_iterator entry(place, error);
   for (const fs::recursive_directory_iterator end; !error && entry != end; entry.increment(error)) {
     if (entry->path().filename() == trace::kEventsFile) files.push_back(entry->path().string());
-    if (entry->path().filename() != trace::kEventsTextFile) continue;
-    // Beside the other form it is that of an earlier run.
-    std::error_code ignored;
-    if (!fs::exists(entry->path().parent_path() / trace::kEventsFile, ignored)) files.push_back(entry->path().string());
   }
   if (error) return trace::file_error(place, 0, fmt::format("cannot list the folder: {}", error.message()));
   if (files.empty() && fs::exists(flight_folder(place), error)) {
@@ -90,7 +86,7 @@ Result<std::vector<std::string>> find_traces(const std::string &place) {
                              fmt::format("'redag recover {}' restores its results", place));
   }
   if (files.empty()) {
-    return trace::file_error(place, 0, "no events.redag or events.jsonl in this folder or below it",
+    return trace::file_error(place, 0, "no events.redag in this folder or below it",
                              "'redag run', 'simulate' and 'compare' write one with '--out DIR'");
   }
   std::sort(files.begin(), files.end());
@@ -110,7 +106,7 @@ bool is_result_name(std::string_view name) {
                                                        "trace.pftrace",
                                                        "trace.json",  // of earlier versions
                                                        "events.redag",
-                                                       "events.jsonl",
+                                                       "events.jsonl",  // of earlier versions
                                                        "workload.yaml",
                                                        "comparison.json",
                                                        "comparison.csv",
