@@ -114,7 +114,7 @@ class CheckTrace(Case):
         trace = self.trace()
         self.assertIn("trace check: ok", self.expect(redag("check-trace", trace), 0).stdout)
         cut = self.folder / "cut.redag"
-        cut.write_bytes(trace.read_bytes()[:-100])
+        cut.write_bytes(trace.read_bytes()[:100])
         self.expect(redag("check-trace", cut), 2, "cut.redag")
         self.expect(redag("check-trace", "--json", cut, trace), 2)
         self.expect(redag("check-trace", self.write("no.redag", "no trace\n")), 2, "no.redag: error: not a file of events")
@@ -278,8 +278,8 @@ class Events(Case):
         events = out / "events.redag"
         good = events.read_bytes()
         events.write_bytes(good[:-1])
-        for command in ["check-trace"], ["report"], ["why"], ["events"]:
-            self.expect(redag(*command, out), 2, f"last block is missing, at byte {len(good) - 1}")
+        for command in ["why"], ["events"]:
+            self.assertIn("; 55 bytes are no whole block", self.expect(redag(*command, out), 0).stderr)
         events.write_bytes(good[:5000] + b"#" + good[5001:])
         self.expect(redag("check-trace", out), 2, "events.redag: error: byte ", "the checksum of the block does not match")
         events.write_bytes(good.replace(b"\r\n", b"\n", 1))
@@ -369,8 +369,8 @@ class Report(Case):
         self.expect(redag("report", out), 2, "comparison.json:1", "was not written by 'redag compare'")
         (out / "comparison.json").unlink()
         events = (out / "events.redag").read_bytes()
-        (out / "events.redag").write_bytes(events[:-1])
-        self.expect(redag("report", out), 2, "events.redag", "file is incomplete")
+        (out / "events.redag").write_bytes(events[:100])
+        self.expect(redag("report", out), 2, "events.redag: error: byte 16: the file is damaged here")
 
     def test_repetitions_of_different_things(self):
         self.results("out/repetition-1")

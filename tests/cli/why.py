@@ -10,7 +10,7 @@ import json
 import re
 import sys
 
-from program import CART, SOURCE, Case, changed_run, in_terminal, main, redag
+from program import CART, SOURCE, Case, in_terminal, main, redag
 
 PID = """\
 name: pid

@@ -31,8 +31,6 @@ void units_target(std::string_view input);
 void live_page_target(std::string_view input);
 /// Reads what an executor states of its rates.
 void order_page_target(std::string_view input);
-/// Recovers the record of a killed run, and makes results of it.
-void flight_target(std::string_view input);
 /// Parses values of the command line and of files: durations, processors, utilizations, patterns of ROS names.
 void values_target(std::string_view input);
 /// Runs every subcommand on a workload that the loader accepts.
@@ -48,9 +46,8 @@ inline constexpr std::array kTargets = {
     Target{"events", events_target},         Target{"jobs_csv", jobs_csv_target},
     Target{"comparison", comparison_target}, Target{"units", units_target},
     Target{"live_page", live_page_target},   Target{"values", values_target},
-    Target{"commands", commands_target},     Target{"flight", flight_target},
-    Target{"robot", robot_target},           Target{"kernel_record", kernel_record_target},
-    Target{"order_page", order_page_target},
+    Target{"commands", commands_target},     Target{"kernel_record", kernel_record_target},
+    Target{"robot", robot_target},           Target{"order_page", order_page_target},
 };
 
 }  // namespace redag::fuzz

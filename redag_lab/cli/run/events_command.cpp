@@ -144,6 +144,7 @@ Result<void> convert(const EventsOptions &options, Console &console) {
   console.note(chosen->note);
   Result<trace::EventsReader> reader = trace::EventsReader::open(chosen->file);
   if (!reader) return tl::unexpected<Diagnostics>(std::move(reader.error()));
+  warn_of_remarks(reader->info(), console);
   const InterruptGuard guard;
   if (options.format == Format::Perfetto) {
     return lab::draw_picture(*reader, options.output, InterruptGuard::interrupted);

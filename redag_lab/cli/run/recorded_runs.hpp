@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
+#include "redag/trace/trace.hpp"
+#include "redag_lab/cli/terminal/console.hpp"
 
 namespace redag::cli {
 
@@ -36,5 +38,8 @@ struct ChosenRun {
 /// Chooses one run. Of repetitions it is the one that missed most deadlines, and of a comparison one of the executor
 /// that it names first. Error: there is no run, or there are several of which none is meant more than the others.
 [[nodiscard]] Result<ChosenRun> choose_run(const std::string &place);
+
+/// Warns of what observers noticed during a run, for example that it was killed before its record was complete.
+void warn_of_remarks(const trace::RunInfo &run, Console &console);
 
 }  // namespace redag::cli

@@ -283,17 +283,11 @@ std::optional<lab::SessionOptions> session_options(const RunArguments &arguments
     }
   }
   if (!arguments.folder.empty()) {
-    if (arguments.flight) options.flight = flight_folder(arguments.folder);
-    options.flight_bytes = std::uint64_t{arguments.flight_mib} << 20U;
+    if (arguments.record) options.record = fmt::format("{}/{}", arguments.folder, trace::kEventsFile);
+    options.record_bytes = std::uint64_t{arguments.record_mib} << 20U;
     if (const Result<void> made = prepare_folder(arguments.folder, arguments.force); !made) {
       console.note(made.error());
       return std::nullopt;
-    }
-    if (arguments.force && arguments.flight) {
-      if (const Result<void> removed = trace::remove_flight_record(options.flight); !removed) {
-        console.note(removed.error());
-        return std::nullopt;
-      }
     }
   }
   return options;
