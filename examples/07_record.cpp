@@ -8,7 +8,7 @@
 //     redag why results/robot
 //     redag check-trace results/robot
 //
-// If the program is killed meanwhile, `redag recover results/robot` restores what it had recorded.
+// If the program is killed meanwhile, they read what it had recorded.
 #include <cstdio>
 #include <stdexcept>
 

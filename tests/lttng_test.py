@@ -67,10 +67,10 @@ class Lttng(unittest.TestCase):
         workload = self.folder / "cart.yaml"
         workload.write_text(WORKLOAD)
         out = self.folder / "out"
-        subprocess.run([PROGRAM, "run", workload, "--duration", "1s", "--no-live", "--json", "--events", "jsonl", "--out", out],
-                       check=True,
-                       capture_output=True, env={**self.environment, **more}, timeout=100)
-        return [json.loads(line) for line in (out / "events.jsonl").read_text().splitlines()[1:-1]]
+        subprocess.run([PROGRAM, "run", workload, "--duration", "1s", "--no-live", "--json", "--out", out],
+                       check=True, capture_output=True, env={**self.environment, **more}, timeout=100)
+        text = subprocess.run([PROGRAM, "events", out], check=True, capture_output=True, text=True, timeout=100).stdout
+        return [json.loads(line) for line in text.splitlines()[1:-1]]
 
     def recorded(self):
         self.lttng("stop", self.session)
@@ -95,7 +95,7 @@ class Lttng(unittest.TestCase):
         self.assertEqual(list(tasks), ["sense", "act", "plan"])
         self.assertEqual((tasks["plan"]["deadline_ns"], tasks["plan"]["dag"]), ("20000000", "1"))
         self.assertEqual(len({fields["executor"] for _, fields in events}), 1)
-        # Each event of events.jsonl is there with its figures. Only the end of the job that ran when the run ended may
+        # Each event that was recorded is there with its figures. Only the end of the job that ran when the run ended may
         # be missing in the file.
         expected = collections.Counter((kind, task, job, worker, reason) for _, kind, task, job, worker, _, reason in written)
         found = collections.Counter((name, int(f["task"]), int(f["job"]), int(f["worker"]), f["reason"])

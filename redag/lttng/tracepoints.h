@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The tracepoints of provider `redag`: an event for each kind of JobEvent, with the names of events.jsonl, one for late
+// The tracepoints of provider `redag`: an event for each kind of JobEvent, with the names that `redag events` prints, one for late
 // jobs, and one that names each task. LTTng reads this header several times, hence no `#pragma once`.
 #undef LTTNG_UST_TRACEPOINT_PROVIDER
 #define LTTNG_UST_TRACEPOINT_PROVIDER redag

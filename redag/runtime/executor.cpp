@@ -50,10 +50,8 @@ Executor::Impl::Impl(ExecutorOptions options) : options_(std::move(options)) {
     recorder_ = *std::move(recorder);
     if (options_.trace_capacity == 0) options_.trace_capacity = kRecordedTrace;
     if (const std::string &aside = recorder_->moved_aside(); !aside.empty()) {
-      setup_.warnings.push_back(
-          fmt::format("an earlier run did not end normally; its record is in '{}' (restore it with "
-                      "'redag recover {} --out DIR')",
-                      aside, aside));
+      setup_.warnings.push_back(fmt::format(
+          "an earlier run did not end normally; its record is now '{0}' ('redag why {0}' explains it)", aside));
     }
   }
   if (options_.on_deadline_miss) {

@@ -92,8 +92,8 @@ struct ExecutorOptions {
   /// body does, and wait() throws it. Empty: no such thread.
   std::function<void(const MissInfo &)> on_deadline_miss{};
   /// Folder where the run is recorded, for `redag report`, `check-trace`, `why` and `diff`; empty: none. Created if it
-  /// is missing. A thread of normal priority writes events to DIR/flight while the run lasts. At the end they become
-  /// DIR/events.redag, which replaces that of an earlier run. After a crash, `redag recover DIR` does this.
+  /// is missing. A thread of normal priority writes events to DIR/events.redag while the run lasts, which replaces that
+  /// of an earlier run. After a crash, the file has all but the last tenth of a second.
   std::string record{};
   std::uint64_t record_bytes = std::uint64_t{256} << 20U;  // of events on disk; then the newest replace the oldest
   /// Starts a thread that reports bodies which do not return, also while the executor stops. With it, `on_budget`

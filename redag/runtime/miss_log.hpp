@@ -9,13 +9,12 @@
 #include <cstdint>
 #include <optional>
 
-#include "redag/base/atomic.hpp"
 #include "redag/base/ids.hpp"
 #include "redag/base/time.hpp"
 #include "redag/model/job_event.hpp"
-#include "redag/runtime/bounded_queue.hpp"
 #include "redag/runtime/executor_options.hpp"
 #include "redag/runtime/parker.hpp"
+#include "redag/trace/ring.hpp"
 
 namespace redag::runtime {
 
@@ -30,25 +29,21 @@ struct Miss {
 
 class MissLog {
  public:
-  explicit MissLog(std::size_t capacity) : queue_(capacity) {}
+  explicit MissLog(std::size_t capacity) : ring_(capacity) {}
 
   /// Returns true if the thread that reports misses must be woken: parker().unpark().
-  [[nodiscard]] bool note(const Miss &miss) {
-    if (writer_.push(miss)) return true;
-    dropped_.store(dropped_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
-    return false;
-  }
+  [[nodiscard]] bool note(const Miss &miss) { return ring_.push(miss); }
 
-  [[nodiscard]] std::optional<Miss> take() { return reader_.pop(); }
+  [[nodiscard]] std::optional<Miss> take() {
+    Miss miss;
+    return ring_.pop({&miss, 1}) == 1 ? std::optional(miss) : std::nullopt;
+  }
   /// How many misses found no room.
-  [[nodiscard]] std::uint64_t dropped() const { return dropped_.load(std::memory_order_relaxed); }
+  [[nodiscard]] std::uint64_t dropped() const { return ring_.dropped(); }
   [[nodiscard]] Parker &parker() { return parker_; }
 
  private:
-  BoundedQueue<Miss> queue_;
-  BoundedQueue<Miss>::Writer writer_ = queue_.writer();
-  BoundedQueue<Miss>::Reader reader_ = queue_.reader();
-  Atomic<std::uint64_t> dropped_{0};
+  trace::RingOf<Miss> ring_;
   Parker parker_;
 };
 

@@ -8,11 +8,11 @@
 namespace redag::runtime {
 namespace {
 
-thread_local const MissReporter *of_this_thread = nullptr;
+thread_local const MissReporter *reporter_of_this_thread = nullptr;
 
 }  // namespace
 
-bool MissReporter::is_this_thread() const { return of_this_thread == this; }
+bool MissReporter::is_this_thread() const { return reporter_of_this_thread == this; }
 
 Result<void> MissReporter::start(const ThreadSetup &setup) {
   if (thread_.joinable()) return {};
@@ -27,7 +27,7 @@ void MissReporter::stop() {
 }
 
 void MissReporter::main() noexcept {
-  of_this_thread = this;
+  reporter_of_this_thread = this;
   for (;;) {
     // Read before the log: what was noted before stop() is reported.
     const bool stopping = stopping_.load(std::memory_order_acquire);

@@ -36,9 +36,10 @@ Result<std::unique_ptr<Recorder>> Recorder::create(const std::string &folder, st
                              std::string("cannot write the record into this folder: ") + std::strerror(errno),
                              "choose another folder, or its permissions");
   }
-  Result<std::string> aside = trace::move_record_aside(folder + "/flight");
+  const std::string path = folder + "/" + std::string(trace::kEventsFile);
+  Result<std::string> aside = trace::move_unfinished_aside(path);
   if (!aside) return tl::unexpected<Diagnostics>(std::move(aside.error()));
-  return std::unique_ptr<Recorder>(new Recorder(folder, most_bytes, *std::move(aside)));
+  return std::unique_ptr<Recorder>(new Recorder(path, most_bytes, *std::move(aside)));
 }
 
 Recorder::~Recorder() { end_thread(); }
@@ -71,16 +72,14 @@ Result<void> Recorder::describe_again() {
   described_at_ = monotonic_now();
   if (info.workload.dags.empty()) return {};
   const bool is_known = info.workload == described_ && info.removals == removals_ && info.settled == settled_;
-  if (flight_ && is_known) return {};
+  if (file_ && is_known) return {};
   described_ = info.workload;
   removals_ = info.removals;
   settled_ = info.settled;
-  if (flight_) return flight_->describe(info);
-  const trace::FlightOptions options{.most_bytes = most_bytes_};
-  Result<trace::FlightRecorder> created = trace::FlightRecorder::create(flight(), info, options);
-  if (!created) return tl::unexpected<Diagnostics>(std::move(created.error()));
-  flight_.emplace(*std::move(created));
-  return {};
+  if (file_) return file_->describe(info);
+  return trace::EventsWriter::record(path_, info, most_bytes_).map([this](trace::EventsWriter &&file) {
+    file_.emplace(std::move(file));
+  });
 }
 
 // Takes the events since the last call. Those after the end of the run follow no rules and are left out.
@@ -95,7 +94,10 @@ void Recorder::collect(Time end) {
       std::any_of(events_.begin(), events_.end(), [&](const JobEvent &e) { return e.task.value >= tasks; });
   const bool is_old = monotonic_now() - described_at_ >= kDescribeEvery;
   if (has_new_task || is_old || end != kNever) state_ = describe_again();
-  if (state_ && flight_) state_ = flight_->append(events_, engine_->lost_events());
+  if (state_ && file_) {
+    file_->add(events_);
+    state_ = file_->flush(engine_->lost_events());
+  }
   if (state_ || end != kNever) return;
   std::fprintf(stderr, "%s: the record of the run ends here: %s\n", name_.c_str(), to_string(state_.error()).c_str());
 }
@@ -104,19 +106,11 @@ Result<void> Recorder::finish(Time end) {
   if (engine_ == nullptr) return {};  // the run never began
   end_thread();
   // An executor can be stopped before its first millisecond is over, at which its times begin.
-  collect(std::max<Time>(end, 0));
+  end = std::max<Time>(end, 0);
+  collect(end);
+  const std::uint64_t lost = engine_->lost_events();
   engine_ = nullptr;
-  if (!state_ || !flight_) return state_;
-  flight_.reset();
-  return write_trace(std::max<Time>(end, 0));
-}
-
-Result<void> Recorder::write_trace(Time end) {
-  Result<trace::Recovered> recovered = trace::recover(flight(), end);
-  if (!recovered) return tl::unexpected<Diagnostics>(std::move(recovered.error()));
-  return trace::write_trace(folder_ + "/" + std::string(trace::kEventsFile), recovered->trace).and_then([this] {
-    return trace::remove_flight_record(flight());
-  });
+  return state_ && file_ ? file_->commit(end, lost) : state_;
 }
 
 }  // namespace redag::runtime

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Records the run of an engine into a folder: to a flight record while it lasts, which becomes events.redag at the end
-// (docs/results_format.md). Owns a thread of normal priority, which takes the engine's events ten times a second.
+// Records the run of an engine into the events.redag of a folder (docs/results_format.md). Owns a thread of normal
+// priority, which takes the engine's events ten times a second.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@
 #include "redag/runtime/engine.hpp"
 #include "redag/runtime/parker.hpp"
 #include "redag/runtime/threads.hpp"
-#include "redag/trace/flight_recorder.hpp"
+#include "redag/trace/events_file.hpp"
 #include "redag/trace/trace.hpp"
 
 namespace redag::runtime {
@@ -27,40 +27,38 @@ class Recorder {
   /// thread.
   using Describe = std::function<trace::RunInfo()>;
 
-  /// Makes sure that `folder` can be written. An unfinished record of an earlier run is moved aside, to flight.1 and so
-  /// on: moved_aside() then names it. Error: what the system refused.
+  /// Makes sure that `folder` can be written. An unfinished record of an earlier run is moved aside, to events.1.redag
+  /// and so on: moved_aside() then names it. Error: what the system refused.
   [[nodiscard]] static Result<std::unique_ptr<Recorder>> create(const std::string &folder, std::uint64_t most_bytes);
-  ~Recorder();  // keeps the flight record, if finish() was not called
+  ~Recorder();  // keeps what was written, if finish() was not called
   Recorder(const Recorder &) = delete;
   Recorder &operator=(const Recorder &) = delete;
 
   /// Starts the record, and the thread. `engine` must live until finish() or the destructor. If there is a thread
   /// already, does nothing. Error: the record cannot be written, or there can be no thread.
   [[nodiscard]] Result<void> start(Engine &engine, Describe describe, const std::string &name);
-  /// Once the engine's threads have ended: writes events.redag of a run that ended at `end`. Error: what could not be
-  /// written, now or before; the flight record is then left for `redag recover`.
+  /// Once the engine's threads have ended: completes the record of a run that ended at `end`. Error: what could not be
+  /// written, now or before; the record then has what was written before.
   [[nodiscard]] Result<void> finish(Time end);
 
   [[nodiscard]] const std::string &moved_aside() const { return moved_aside_; }
 
  private:
-  Recorder(std::string folder, std::uint64_t most_bytes, std::string moved_aside)
-      : folder_(std::move(folder)), most_bytes_(most_bytes), moved_aside_(std::move(moved_aside)) {}
+  Recorder(std::string path, std::uint64_t most_bytes, std::string moved_aside)
+      : path_(std::move(path)), most_bytes_(most_bytes), moved_aside_(std::move(moved_aside)) {}
 
-  [[nodiscard]] std::string flight() const { return folder_ + "/flight"; }
   void main() noexcept;
   void end_thread();
   void collect(Time end);
   [[nodiscard]] Result<void> describe_again();
-  [[nodiscard]] Result<void> write_trace(Time end);
 
-  const std::string folder_;
+  const std::string path_;
   const std::uint64_t most_bytes_;
   const std::string moved_aside_;
   Engine *engine_ = nullptr;
   Describe describe_;
   std::string name_;
-  std::optional<trace::FlightRecorder> flight_;  // from the first task on
+  std::optional<trace::EventsWriter> file_;  // from the first task on
   Workload described_;
   std::vector<trace::Removal> removals_;  // described
   std::optional<Time> settled_;           // described

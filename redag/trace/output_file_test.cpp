@@ -128,9 +128,9 @@ TEST(ReadFile, DevicesAndLongFilesAreErrors) {
 }
 
 TEST(ReadFile, MissingFileIsAnError) {
-  const auto text = read_file("/nonexistent/events.jsonl");
+  const auto text = read_file("/nonexistent/events.redag");
   ASSERT_FALSE(text);
-  EXPECT_EQ(text.error().front().file, "/nonexistent/events.jsonl");
+  EXPECT_EQ(text.error().front().file, "/nonexistent/events.redag");
 }
 
 }  // namespace

@@ -42,17 +42,15 @@ std::vector<JobEvent> visited(const Recording &run) {
 
 TEST(Recording, EachVisitBeginsWithTheFirstEvent) {
   const Trace trace = long_run();
-  const std::string place =
+  const std::string path =
       (std::filesystem::temp_directory_path() / ("redag_recording_" + std::to_string(::getpid()))).string();
-  for (const std::string &path : {place + ".redag", place + ".jsonl"}) {
-    ASSERT_TRUE(write_trace(path, trace));
-    const Result<Recording> run = Recording::open(path);
-    ASSERT_TRUE(run);
-    EXPECT_EQ(run->info().end, trace.info.end);
-    EXPECT_EQ(visited(*run), trace.events);
-    EXPECT_EQ(visited(*run), trace.events) << path;
-    std::filesystem::remove(path);
-  }
+  ASSERT_TRUE(write_trace(path, trace));
+  const Result<Recording> run = Recording::open(path);
+  ASSERT_TRUE(run);
+  EXPECT_EQ(run->info().end, trace.info.end);
+  EXPECT_EQ(visited(*run), trace.events);
+  EXPECT_EQ(visited(*run), trace.events);
+  std::filesystem::remove(path);
   const Recording in_memory(trace);
   EXPECT_EQ(visited(in_memory), trace.events);
   EXPECT_EQ(visited(in_memory), trace.events);
@@ -61,7 +59,7 @@ TEST(Recording, EachVisitBeginsWithTheFirstEvent) {
 TEST(Recording, DamageIsFoundInEachVisit) {
   const Trace trace = long_run();
   const std::string path =
-      (std::filesystem::temp_directory_path() / ("redag_damaged_" + std::to_string(::getpid()) + ".jsonl")).string();
+      (std::filesystem::temp_directory_path() / ("redag_damaged_" + std::to_string(::getpid()) + ".redag")).string();
   ASSERT_TRUE(write_trace(path, trace));
   const Result<Recording> run = Recording::open(path);
   ASSERT_TRUE(run);

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A ring of JobEvents from one writing thread to one reading thread. Owns its storage, which is allocated once. push()
-// never blocks or allocates; an event that does not fit is dropped and counted. Threads: push() from one thread, pop()
+// A ring of values from one writing thread to one reading thread. Owns its storage, which is allocated once. push()
+// never blocks or allocates; a value that does not fit is dropped and counted. Threads: push() from one thread, pop()
 // and drain() from one other; capacity(), pushed() and dropped() from any.
 #pragma once
 
@@ -18,17 +18,18 @@
 
 namespace redag::trace {
 
-class Ring {
+template <class T>
+class RingOf {
  public:
-  /// Makes room for at least `capacity` events (rounded up to a power of two, >= 2).
-  explicit Ring(std::size_t capacity)
+  /// Makes room for at least `capacity` values (rounded up to a power of two, >= 2).
+  explicit RingOf(std::size_t capacity)
       : slots_(std::bit_ceil(std::max<std::size_t>(capacity, 2))), mask_(slots_.size() - 1) {}
 
-  Ring(const Ring &) = delete;
-  Ring &operator=(const Ring &) = delete;
+  RingOf(const RingOf &) = delete;
+  RingOf &operator=(const RingOf &) = delete;
 
-  /// Producer only. Returns false if the ring was full and the event is lost.
-  bool push(const JobEvent &event) noexcept {
+  /// Producer only. Returns false if the ring was full and the value is lost.
+  bool push(const T &value) noexcept {
     const std::uint64_t tail = producer_.index.load(std::memory_order_relaxed);
     if (tail - producer_.other >= slots_.size()) {
       // Reads the reader's index only when the last known one says "full": no cache line bounces in steady state.
@@ -38,13 +39,13 @@ class Ring {
         return false;
       }
     }
-    slots_[tail & mask_] = event;
+    slots_[tail & mask_] = value;
     producer_.index.store(tail + 1, std::memory_order_release);
     return true;
   }
 
-  /// Consumer only. Moves the oldest events to `out`; returns how many.
-  std::size_t pop(std::span<JobEvent> out) noexcept {
+  /// Consumer only. Moves the oldest values to `out`; returns how many.
+  std::size_t pop(std::span<T> out) noexcept {
     const std::uint64_t head = consumer_.index.load(std::memory_order_relaxed);
     if (consumer_.other - head < out.size()) consumer_.other = producer_.index.load(std::memory_order_acquire);
     const std::size_t count = std::min<std::size_t>(consumer_.other - head, out.size());
@@ -53,8 +54,8 @@ class Ring {
     return count;
   }
 
-  /// Consumer only. Appends all available events to `out`; returns how many.
-  std::size_t drain(std::vector<JobEvent> &out) {
+  /// Consumer only. Appends all available values to `out`; returns how many.
+  std::size_t drain(std::vector<T> &out) {
     const std::uint64_t head = consumer_.index.load(std::memory_order_relaxed);
     const std::size_t count = producer_.index.load(std::memory_order_acquire) - head;
     const std::size_t before = out.size();
@@ -64,10 +65,10 @@ class Ring {
 
   [[nodiscard]] std::size_t capacity() const noexcept { return slots_.size(); }
 
-  /// Number of events lost so far because the reader was behind.
+  /// Number of values lost so far because the reader was behind.
   [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
 
-  /// Number of events accepted so far.
+  /// Number of values accepted so far.
   [[nodiscard]] std::uint64_t pushed() const noexcept { return producer_.index.load(std::memory_order_acquire); }
 
  private:
@@ -80,11 +81,13 @@ class Ring {
     std::uint64_t other = 0;
   };
 
-  std::vector<JobEvent> slots_;
+  std::vector<T> slots_;
   std::size_t mask_;
   End producer_;
   End consumer_;
   alignas(kCacheLine) Atomic<std::uint64_t> dropped_{0};
 };
+
+using Ring = RingOf<JobEvent>;
 
 }  // namespace redag::trace

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// RunInfo as a JSON object: the "run" of events.jsonl, summary.json and flight records. It contains the workload as
+// RunInfo as a JSON object: the "run" of events.redag and summary.json. It contains the workload as
 // YAML text. Pure functions.
 #pragma once
 

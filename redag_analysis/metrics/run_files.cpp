@@ -13,13 +13,11 @@ namespace {
 constexpr std::string_view kJobsFile = "jobs.csv";
 constexpr std::string_view kPictureFile = "trace.pftrace";
 
-std::string_view events_name(bool as_text) { return as_text ? trace::kEventsTextFile : trace::kEventsFile; }
-
 }  // namespace
 
 Result<RunFiles> RunFiles::create(const FilesOptions &options, const trace::RunInfo &run) {
   const auto path = [&](std::string_view name) { return options.folder + "/" + std::string(name); };
-  auto events = trace::EventsWriter::create(path(events_name(options.events_as_text)), run);
+  auto events = trace::EventsWriter::create(path(trace::kEventsFile), run);
   if (!events) return tl::unexpected<Diagnostics>(std::move(events.error()));
   RunFiles files(options, run, *std::move(events));
   if (options.jobs) {
@@ -49,13 +47,12 @@ Diagnostics RunFiles::commit(Time end, std::uint64_t lost_events) {
   Diagnostics problems;
   const auto keep = [&problems](const Result<void> &written) {
     if (!written) problems.insert(problems.end(), written.error().begin(), written.error().end());
-    return written.has_value();
   };
   const auto remove_stale = [this](std::string_view name) {
     std::error_code ignored;
     std::filesystem::remove(path(name), ignored);
   };
-  if (keep(events_.commit(end, lost_events))) remove_stale(events_name(!options_.events_as_text));
+  keep(events_.commit(end, lost_events));
   if (jobs_) {
     keep(jobs_->commit());
   } else {
@@ -71,7 +68,7 @@ Diagnostics RunFiles::commit(Time end, std::uint64_t lost_events) {
 
 std::string RunFiles::names() const {
   std::string names = jobs_ ? std::string(kJobsFile) + ", " : "";
-  names += events_name(options_.events_as_text);
+  names += trace::kEventsFile;
   if (picture_) names += ", " + std::string(kPictureFile);
   return names;
 }

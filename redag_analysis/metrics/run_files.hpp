@@ -33,9 +33,8 @@ enum class Picture : std::uint8_t {
 inline constexpr std::uint64_t kMostPicturedEvents = 500'000;
 
 struct FilesOptions {
-  std::string folder;           // exists; empty: no files
-  bool events_as_text = false;  // events.jsonl instead of events.redag
-  bool jobs = true;             // jobs.csv, of long runs most of the results
+  std::string folder;  // exists; empty: no files
+  bool jobs = true;    // jobs.csv, of long runs most of the results
   Picture picture = Picture::Auto;
 };
 

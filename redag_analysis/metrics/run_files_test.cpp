@@ -42,13 +42,11 @@ TEST_F(RunFilesTest, ATraceInMemoryIsWrittenAsAWhole) {
   EXPECT_EQ(again->info.end, trace.info.end);
 }
 
-TEST_F(RunFilesTest, AnotherFormReplacesTheFilesOfTheFirst) {
+TEST_F(RunFilesTest, FewerFilesReplaceThoseOfAnEarlierRun) {
   ASSERT_TRUE(write_run_files({.folder = folder_.string()}, example()));
-  const auto names =
-      write_run_files({.folder = folder_.string(), .events_as_text = true, .picture = Picture::Never}, example());
+  const auto names = write_run_files({.folder = folder_.string(), .picture = Picture::Never}, example());
   ASSERT_TRUE(names) << to_string(names.error());
-  EXPECT_EQ(*names, "jobs.csv, events.jsonl");
-  EXPECT_FALSE(fs::exists(folder_ / "events.redag"));
+  EXPECT_EQ(*names, "jobs.csv, events.redag");
   EXPECT_FALSE(fs::exists(folder_ / "trace.pftrace"));
   const auto fewer = write_run_files({.folder = folder_.string(), .jobs = false, .picture = Picture::Never}, example());
   ASSERT_TRUE(fewer) << to_string(fewer.error());

@@ -121,7 +121,7 @@ Result<experiment::FinishedRun> run_in_ros2(const experiment::PlannedRun &planne
   if (!WIFEXITED(status) || WEXITSTATUS(status) > 1) {
     return make_error(fmt::format("'{}' failed with this message: {}", name, last_words(log)));
   }
-  Result<trace::Trace> trace = trace::read_trace(out + "/events.jsonl");
+  Result<trace::Trace> trace = trace::read_trace(fmt::format("{}/{}", out, trace::kEventsFile));
   if (!trace) return tl::unexpected<Diagnostics>(std::move(trace.error()));
   experiment::FinishedRun run;
   run.trace = std::move(*trace);

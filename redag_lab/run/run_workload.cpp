@@ -62,7 +62,7 @@ class Run {
     const Result<void> started = prepare().and_then([&] { return record(); }).and_then([&] { return start(); });
     if (!started) {
       // A run that did not start has no record to keep.
-      if (flight_) static_cast<void>(trace::remove_flight_record(options_.flight));
+      if (record_) static_cast<void>(std::remove(options_.record.c_str()));
       return tl::unexpected<Diagnostics>(started.error());
     }
     collect_until_horizon();
@@ -274,22 +274,27 @@ class Run {
 
   Result<void> record() {
     describe();
-    if (options_.flight.empty()) return {};
-    Result<trace::FlightRecorder> recorder =
-        trace::FlightRecorder::create(options_.flight, result_.trace.info, options_.flight_options);
-    if (!recorder) return tl::unexpected(recorder.error());
-    flight_.emplace(std::move(*recorder));
-    return {};
+    if (options_.record.empty()) return {};
+    const Result<std::string> aside = trace::move_unfinished_aside(options_.record);
+    if (!aside) return tl::unexpected<Diagnostics>(aside.error());
+    if (!aside->empty())
+      result_.warnings.push_back(fmt::format("an earlier run did not end normally; its record is now '{}'", *aside));
+    return trace::EventsWriter::record(options_.record, result_.trace.info, options_.record_bytes)
+        .map([this](trace::EventsWriter &&file) { record_.emplace(std::move(file)); });
   }
 
-  // Collects all events so far and appends the new ones to the flight record.
+  // Collects all events so far and records the new ones.
   void drain(bool finally) {
     auto &events = result_.trace.events;
     const std::size_t before = events.size();
     collect(events, finally);
-    if (!flight_) return;
-    const Result<void> kept = flight_->append(std::span(events).subspan(before), lost_events());
-    if (!kept) result_.warnings.push_back(fmt::format("the flight record ends here: {}", to_string(kept.error())));
+    if (!record_) return;
+    record_->add(std::span(events).subspan(before));
+    const Result<void> kept = record_->flush(lost_events());
+    if (kept) return;
+    record_.reset();
+    result_.warnings.push_back(
+        fmt::format("if this process is killed, its trace is lost: {}", to_string(kept.error())));
   }
 
   // Appends the new events of all clusters, in order of time. Those of the last moments are kept back, because another
@@ -467,7 +472,7 @@ class Run {
   Mutex notes_lock_;
   std::vector<std::string> notes_ REDAG_GUARDED_BY(notes_lock_);  // from the watchdogs, not yet reported
   std::atomic<bool> give_up_{false};
-  std::optional<trace::FlightRecorder> flight_;
+  std::optional<trace::EventsWriter> record_;
   std::vector<runtime::Body> bodies_;                 // by TaskId, until the engines have them
   std::vector<std::unique_ptr<Instance>> instances_;  // at least one once prepared
   std::unique_ptr<live::Publisher> live_;             // after the engines, whose figures it reads until it is destroyed

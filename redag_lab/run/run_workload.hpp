@@ -19,7 +19,7 @@
 #include "redag/runtime/engine.hpp"
 #include "redag/runtime/watchdog.hpp"
 #include "redag/sched/scheduler.hpp"
-#include "redag/trace/flight_recorder.hpp"
+#include "redag/trace/events_file.hpp"
 #include "redag/trace/trace.hpp"
 
 namespace redag::lab {
@@ -54,10 +54,10 @@ struct RunOptions {
   bool live = false;  // publishes a live page for `redag top`
   /// For the live page: proven bounds on response times by task, 0 where there is none. Called once, before the start.
   std::function<std::vector<Duration>(const sched::Config &)> bounds;
-  /// Folder for a record of the run that outlives the process (trace/flight_recorder.hpp); empty: none. The record
-  /// stays after the run. Call remove_flight_record() once the trace is stored elsewhere.
-  std::string flight;
-  trace::FlightOptions flight_options;
+  /// File for a record of the run that outlives the process (trace::EventsWriter::record()); empty: none. It is not
+  /// completed after the run: the caller replaces it by the trace.
+  std::string record;
+  std::uint64_t record_bytes = trace::kMostRecordBytes;
   const std::atomic<bool> *stop = nullptr;  // ends the run early when set (Ctrl-C)
   /// Takes the new events about ten times a second, in the order of the trace, on the calling thread. The result's
   /// trace then holds none, and memory does not grow with the run. `info` is that of the result, except `end` and

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <filesystem>
 #include <span>
 #include <utility>
 #include <vector>
@@ -299,26 +300,29 @@ TEST(RunWorkload, BodiesOfOnesOwn) {
   EXPECT_LT(last, 10 * kSecond);
 }
 
-// The record holds the trace up to the last collection, and the caller deletes its folder.
+// The record holds the trace, and has no end: the caller replaces it.
 TEST(RunWorkload, RecordsWhatHappens) {
-  const std::string folder = ::testing::TempDir() + "redag_run_flight." + std::to_string(::getpid());
+  const std::string file = ::testing::TempDir() + "redag_run_record." + std::to_string(::getpid()) + ".redag";
   RunOptions options;
   options.duration = 300 * kMillisecond;
-  options.flight = folder;
+  options.record = file;
   const Result<RunResult> result = run_workload(two_rates(1, PreemptionMode::None), options);
   ASSERT_TRUE(result) << to_string(result.error());
-  const Result<trace::Recovered> recorded = trace::recover(folder);
+  const Result<trace::Trace> recorded = trace::read_trace(file);
   ASSERT_TRUE(recorded) << to_string(recorded.error());
-  const std::vector<JobEvent> &events = recorded->trace.events;
+  const std::vector<JobEvent> &events = recorded->events;
   ASSERT_GT(events.size(), 100U);
   ASSERT_LE(events.size(), result->trace.events.size() + 16) << "the trace ends at the halt";
   const std::size_t common = std::min(events.size(), result->trace.events.size());
   EXPECT_TRUE(
       std::equal(events.begin(), events.begin() + static_cast<std::ptrdiff_t>(common), result->trace.events.begin()));
-  EXPECT_EQ(recorded->trace.info.executor, "redag");
+  EXPECT_EQ(recorded->info.executor, "redag");
   const Result<RunResult> second = run_workload(two_rates(1, PreemptionMode::None), options);
-  EXPECT_FALSE(second) << "nobody writes over a record";
-  EXPECT_TRUE(trace::remove_flight_record(folder));
+  ASSERT_TRUE(second) << to_string(second.error());
+  ASSERT_FALSE(second->warnings.empty());
+  EXPECT_NE(second->warnings.front().find(".1.redag"), std::string::npos) << "the first record is not lost";
+  std::filesystem::remove(file);
+  std::filesystem::remove(file.substr(0, file.size() - 6) + ".1.redag");
 }
 
 TEST(RunClusters, RefusesProcessorsOfTheCommandLine) {

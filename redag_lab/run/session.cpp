@@ -239,8 +239,8 @@ Result<Session> run_on_threads(const Workload &workload, const Variant &variant,
   run.cpus = options.cpus;
   run.stop = options.stop;
   run.live = options.live;
-  run.flight = options.flight;
-  run.flight_options.most_bytes = options.flight_bytes;
+  run.record = options.record;
+  run.record_bytes = options.record_bytes;
   if (options.watchdog > 0) run.watchdog = runtime::WatchdogOptions{{options.watchdog, 0}, 10 * kMillisecond};
   run.on_overdue = options.on_overdue;
   run.bounds = [&](const sched::Config &config) { return bounds_of(workload, variant, config); };
@@ -298,17 +298,6 @@ Result<Session> run_session(const Workload &workload, const Variant &variant, co
                                          : run_on_threads(*configured, variant, options, progress);
   if (!session) return session;
   session->elapsed = since(begin);
-  return session;
-}
-
-Session session_of(trace::Trace trace) {
-  Session session;
-  session.trace = std::move(trace);
-  session.info = session.trace.info;
-  session.summary = metrics::summarize(session.trace);
-  session.events = session.trace.events.size();
-  session.checked = session.events;
-  session.check = metrics::check_trace(session.trace, metrics::rules_for(session.trace.info));
   return session;
 }
 

@@ -16,7 +16,7 @@
 #include "redag/base/result.hpp"
 #include "redag/model/overheads.hpp"
 #include "redag/model/workload.hpp"
-#include "redag/trace/flight_recorder.hpp"
+#include "redag/trace/events_file.hpp"
 #include "redag/trace/trace.hpp"
 #include "redag_analysis/metrics/check_report.hpp"
 #include "redag_analysis/metrics/run_files.hpp"
@@ -47,8 +47,8 @@ struct SessionOptions {
   bool realtime_threads = false;
   Duration spin = 0;
   bool live = false;   // publishes a live page for `redag top`
-  std::string flight;  // folder for a record of the run that outlives the process; empty: none
-  std::uint64_t flight_bytes = trace::FlightOptions{}.most_bytes;
+  std::string record;  // file for a record of the run that outlives the process; empty: none
+  std::uint64_t record_bytes = trace::kMostRecordBytes;
   Duration watchdog = 0;  // reports jobs that run for longer to `on_overdue` at once; 0: off
   std::function<void(const std::string &text)> on_overdue;
 };
@@ -74,9 +74,6 @@ struct Session {
 /// Runs a session. `workload` must be valid. Errors: resources that the machine refused, an unwritable folder.
 [[nodiscard]] Result<Session> run_session(const Workload &workload, const Variant &variant,
                                           const SessionOptions &options, const ProgressHook &progress = {});
-
-/// Evaluates a recorded run as if it had just ended.
-[[nodiscard]] Session session_of(trace::Trace trace);
 
 /// Returns a warning if other programs keep the machine busy before a run on threads; nothing if it is quiet.
 [[nodiscard]] std::optional<std::string> busy_machine_warning();

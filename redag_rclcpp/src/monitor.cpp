@@ -76,9 +76,9 @@ class Monitor::Impl : public std::enable_shared_from_this<Impl> {
     if (options_.trace.empty()) return;
     const redag::Result<void> ready = prepare_folder(options_.trace);
     if (!ready) throw std::runtime_error(to_string(ready.error()));
-    if (const auto aside = flight_.prepare(options_.trace)) {
+    if (const auto aside = record_.prepare(options_.trace)) {
       RCLCPP_WARN(node_->get_logger(),
-                  "an earlier process was killed: restore the results of its trace with 'redag recover %s --out DIR'",
+                  "an earlier process was killed: its trace is now '%s', which 'redag why' and 'redag report' read",
                   aside->c_str());
     }
   }
@@ -115,7 +115,7 @@ class Monitor::Impl : public std::enable_shared_from_this<Impl> {
   // Used by the monitor's thread, and by finish() once that thread has ended.
   Diagnoser diagnoser_;
   TraceKeeper keeper_;
-  FlightLog flight_;
+  RunRecord record_;
   std::vector<JobEvent> events_;
 
   std::thread thread_;
@@ -267,7 +267,7 @@ void Monitor::Impl::drain() {
   events_.clear();
   executor_.drain_trace(events_);
   if (!options_.trace.empty()) {
-    if (const redag::Result<void> recorded = flight_.add(events_, executor_); !recorded) {
+    if (const redag::Result<void> recorded = record_.add(events_, executor_); !recorded) {
       RCLCPP_WARN(node_->get_logger(), "if this process is killed, its trace is lost: %s",
                   to_string(recorded.error()).c_str());
     }
@@ -328,14 +328,10 @@ redag::Result<void> Monitor::Impl::finish() {
   if (has_trace) {
     write_metrics(options_.trace + "/metrics.json");
     using redag::metrics::Picture;
-    redag::metrics::FilesOptions files{.folder = options_.trace, .events_as_text = options_.events_as_text};
+    redag::metrics::FilesOptions files{.folder = options_.trace};
     if (options_.picture) files.picture = *options_.picture ? Picture::Always : Picture::Never;
     const redag::Diagnostics more = keeper_.write(files, executor_);
     problems.insert(problems.end(), more.begin(), more.end());
-    // Removes the flight record only if all results were written.
-    if (problems.empty()) {
-      if (const redag::Result<void> removed = flight_.remove(); !removed) problems = removed.error();
-    }
     if (problems.empty()) {
       RCLCPP_INFO(node_->get_logger(), "wrote %s: metrics.json, %s ('redag report %s' makes a page of them)",
                   options_.trace.c_str(), keeper_.names().c_str(), options_.trace.c_str());

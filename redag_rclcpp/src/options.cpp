@@ -225,10 +225,7 @@ std::string read_trace(Reader &reader) {
 }
 
 /// Names and values are those of the options of `redag run`.
-void read_forms(Reader &reader, MonitorOptions &options) {
-  options.events_as_text =
-      reader.word("events", "Form of the events of `trace`: events.redag (compressed), or events.jsonl (text)",
-                  {"redag", "jsonl"}) == "jsonl";
+void read_picture(Reader &reader, MonitorOptions &options) {
   const std::string picture = reader.word(
       "picture",
       "Whether `trace` has trace.pftrace, the schedule as a picture; auto: if there are at most 500 000 events",
@@ -366,7 +363,7 @@ MonitorOptions declare_monitor_options(rclcpp::Node &node, const ReDAGOptions &e
       reader.text({"save_path", "File to which the service ~/save writes the learned workload", "the path of a file"},
                   options.save_path, false);
   options.trace = read_trace(reader);
-  read_forms(reader, options);
+  read_picture(reader, options);
   options.trace_events = static_cast<std::size_t>(reader.integer(
       {"trace_events", "Number of events that are kept for `trace`, at 32 bytes each; later events are dropped",
        fmt::format("a whole number from 1 to {}", kMostTraceEvents)},

@@ -52,24 +52,26 @@ redag::Diagnostics TraceKeeper::write(const redag::metrics::FilesOptions &files,
   return problems;
 }
 
-std::optional<std::string> FlightLog::prepare(const std::string &folder) {
-  folder_ = folder + "/flight";
+std::optional<std::string> RunRecord::prepare(const std::string &folder) {
+  path_ = fmt::format("{}/{}", folder, redag::trace::kEventsFile);
   // A robot must start again after a crash, and its user may want the record.
-  redag::Result<std::string> aside = redag::trace::move_record_aside(folder_);
-  if (!aside || aside->empty()) return std::nullopt;  // where it could not be moved, creating the next one fails
+  redag::Result<std::string> aside = redag::trace::move_unfinished_aside(path_);
+  if (!aside || aside->empty()) return std::nullopt;
   return *std::move(aside);
 }
 
-redag::Result<void> FlightLog::add(const std::vector<redag::JobEvent> &events, const ReDAGExecutor &executor) {
-  if (broken_ || (events.empty() && !recorder_)) return {};
-  redag::Result<void> kept =
-      describe(events, executor).and_then([&] { return recorder_->append(events, executor.lost_events()); });
+redag::Result<void> RunRecord::add(const std::vector<redag::JobEvent> &events, const ReDAGExecutor &executor) {
+  if (broken_ || (events.empty() && !file_)) return {};
+  redag::Result<void> kept = describe(events, executor).and_then([&] {
+    file_->add(events);
+    return file_->flush(executor.lost_events());
+  });
   broken_ = !kept;
   return kept;
 }
 
 // Describes the run again when new tasks have appeared, their rates were learned, or a deadlock has begun or ended.
-redag::Result<void> FlightLog::describe(const std::vector<redag::JobEvent> &events, const ReDAGExecutor &executor) {
+redag::Result<void> RunRecord::describe(const std::vector<redag::JobEvent> &events, const ReDAGExecutor &executor) {
   const bool is_known = std::all_of(events.begin(), events.end(),
                                     [this](const auto &event) { return event.task.value < positions_.size(); });
   const bool was_learning = std::exchange(learning_, !executor.learning_done());
@@ -79,17 +81,9 @@ redag::Result<void> FlightLog::describe(const std::vector<redag::JobEvent> &even
   }
   if (is_known && was_learning == learning_ && before == deadlocks_) return {};
   const redag::trace::RunInfo info = executor.run_info(positions_);
-  if (recorder_) return recorder_->describe(info, positions_);
-  auto created = redag::trace::FlightRecorder::create(folder_, info, {}, positions_);
-  if (!created) return tl::unexpected<redag::Diagnostics>(created.error());
-  recorder_.emplace(std::move(*created));
-  return {};
-}
-
-redag::Result<void> FlightLog::remove() {
-  if (!recorder_) return {};
-  recorder_.reset();
-  return redag::trace::remove_flight_record(folder_);
+  if (file_) return file_->describe(info, positions_);
+  return redag::trace::EventsWriter::record(path_, info, redag::trace::kMostRecordBytes, positions_)
+      .map([this](redag::trace::EventsWriter &&file) { file_.emplace(std::move(file)); });
 }
 
 }  // namespace redag_rclcpp

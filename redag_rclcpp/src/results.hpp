@@ -12,7 +12,7 @@
 
 #include "redag/base/result.hpp"
 #include "redag/model/job_event.hpp"
-#include "redag/trace/flight_recorder.hpp"
+#include "redag/trace/events_file.hpp"
 #include "redag_analysis/metrics/run_files.hpp"
 #include "redag_rclcpp/executor.hpp"
 
@@ -46,22 +46,20 @@ class TraceKeeper {
   std::vector<redag::JobEvent> events_;
 };
 
-/// Records the run in `folder`/flight, in a form that outlives the process. `redag recover` makes results of it.
-class FlightLog {
+/// Records the run in events.redag, which outlives the process. The results replace it at the end.
+class RunRecord {
  public:
-  /// Moves the record of an earlier process aside, to flight.1 and so on. Returns the new path, or nothing.
+  /// Moves the record of an earlier process aside, to events.1.redag and so on. Returns the new path, or nothing.
   [[nodiscard]] std::optional<std::string> prepare(const std::string &folder);
   /// Appends events, and describes the run again if its tasks or its deadlocks have changed. An error is returned only
   /// once; afterwards nothing is recorded.
   [[nodiscard]] redag::Result<void> add(const std::vector<redag::JobEvent> &events, const ReDAGExecutor &executor);
-  /// Removes the record. Call it when the results are written.
-  [[nodiscard]] redag::Result<void> remove();
 
  private:
   [[nodiscard]] redag::Result<void> describe(const std::vector<redag::JobEvent> &events, const ReDAGExecutor &executor);
 
-  std::string folder_;
-  std::optional<redag::trace::FlightRecorder> recorder_;
+  std::string path_;
+  std::optional<redag::trace::EventsWriter> file_;
   std::vector<std::uint32_t> positions_;  // positions of the tasks that the record describes
   bool learning_ = true;
   redag::Time deadlocks_ = 0;  // when the deadlocks in the description have changed last

@@ -20,7 +20,6 @@
 #include "redag/model/workload_yaml.hpp"
 #include "redag/runtime/threads.hpp"
 #include "redag/trace/events_file.hpp"
-#include "redag/trace/flight_recorder.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"
 #include "spinning.hpp"
 #include "std_msgs/msg/string.hpp"
@@ -263,30 +262,28 @@ TEST_F(MonitorTest, ResultsAreWrittenWhenSpinningHasEnded) {
   EXPECT_TRUE(monitor_->finish()) << "once more does nothing";
 }
 
-// The flight record must exist while the executor spins: it is what a killed process leaves.
+// What a killed process leaves.
 TEST_F(MonitorTest, ARecordIsThereWhileItSpins) {
   options_.trace_capacity = 1 << 14;
   monitor_options_.trace = folder_ / "results";
-  const std::filesystem::path record = folder_ / "results" / "flight";
-  std::filesystem::create_directories(record);
-  std::ofstream(record / "run.json") << "of an earlier process";
+  const std::filesystem::path record = folder_ / "results" / "events.redag";
+  std::filesystem::create_directories(record.parent_path());
+  std::ofstream(record) << "of an earlier process";
   add_timer(10ms, [] {});
   start();
-  EXPECT_TRUE(std::filesystem::exists(folder_ / "results" / "flight.1" / "run.json")) << "it is moved aside";
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "results" / "events.1.redag")) << "it is moved aside";
+  redag::Result<redag::trace::Trace> recorded;
   ASSERT_TRUE(eventually([&] {
-    std::error_code ignored;
-    return std::filesystem::file_size(record / "events.bin", ignored) > 4096 && !ignored;
+    recorded = redag::trace::read_trace(record);
+    return recorded && recorded->events.size() > 5;
   }));
-  // Reads a copy, because the record is locked while it is written.
-  std::filesystem::copy(record, folder_ / "copy");
-  const auto recovered = redag::trace::recover(folder_ / "copy");
-  ASSERT_TRUE(recovered) << to_string(recovered.error());
-  EXPECT_GT(recovered->trace.events.size(), 5U);
-  EXPECT_EQ(recovered->trace.info.driver, redag::trace::Driver::Ros);
-  EXPECT_EQ(recovered->damaged, 0U);
+  EXPECT_EQ(recorded->info.driver, redag::trace::Driver::Ros);
+  EXPECT_EQ(recorded->info.remarks.size(), 1U) << "it goes on";
   stop();
   ASSERT_TRUE(monitor_->finish());
-  EXPECT_FALSE(std::filesystem::exists(record)) << "the results are written";
+  recorded = redag::trace::read_trace(record);
+  ASSERT_TRUE(recorded) << to_string(recorded.error());
+  EXPECT_TRUE(recorded->info.remarks.empty()) << "the results are written";
 }
 
 TEST_F(MonitorTest, ATraceThatIsTooLongEndsEarlier) {
@@ -294,19 +291,16 @@ TEST_F(MonitorTest, ATraceThatIsTooLongEndsEarlier) {
   options_.trace_capacity = 1 << 14;
   monitor_options_.trace = folder_ / "results";
   monitor_options_.trace_events = 25;
-  monitor_options_.events_as_text = true;
   monitor_options_.picture = false;
   add_timer(10ms, [] {});
   start();
   ASSERT_TRUE(eventually([] { return LogCapture::warnings_with("the trace ends here, after 25 events") == 1; }));
   stop();
   ASSERT_TRUE(monitor_->finish());
-  const auto trace = redag::trace::read_trace(folder_ / "results" / "events.jsonl");
+  const auto trace = redag::trace::read_trace(folder_ / "results" / "events.redag");
   ASSERT_TRUE(trace) << to_string(trace.error());
   EXPECT_EQ(trace->events.size(), 25U);
-  for (const char *name : {"events.redag", "trace.pftrace"}) {
-    EXPECT_FALSE(std::filesystem::exists(folder_ / "results" / name)) << name;
-  }
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "results" / "trace.pftrace"));
   EXPECT_EQ(trace->info.end, trace->events.back().time);
 }
 

@@ -98,7 +98,6 @@ TEST_F(OptionsTest, Defaults) {
   const MonitorOptions monitor = declare_monitor_options(*node, options);
   EXPECT_EQ(monitor.period, 1s);
   EXPECT_EQ(monitor.trace, "");
-  EXPECT_FALSE(monitor.events_as_text);
   EXPECT_FALSE(monitor.picture);
   EXPECT_EQ(monitor.metrics_file, "");
   EXPECT_FALSE(monitor.workload);
@@ -125,7 +124,6 @@ TEST_F(OptionsTest, ValuesAreRead) {
                                {"lockstep", true},
                                {"trace", "results"},
                                {"metrics_period", 0.25},
-                               {"events", "jsonl"},
                                {"picture", "never"},
                                {"trace_events", 10},
                                {"metrics_file", "m.json"},
@@ -153,7 +151,6 @@ TEST_F(OptionsTest, ValuesAreRead) {
   const MonitorOptions monitor = declare_monitor_options(*node, options);
   EXPECT_EQ(monitor.period, 250ms);
   EXPECT_EQ(monitor.trace, "results");
-  EXPECT_TRUE(monitor.events_as_text);
   EXPECT_EQ(monitor.picture, false);
   EXPECT_EQ(monitor.trace_events, 10U);
   EXPECT_EQ(monitor.metrics_file, "m.json");
@@ -222,8 +219,6 @@ TEST_F(OptionsTest, MistakesSayWhichParameterWhatItIsAndWhatIsAllowed) {
               AllOf(HasSubstr("'raise_middleware'"), HasSubstr("true or false")));
   EXPECT_THAT(mistake_with({{"bounds", "yes"}}), AllOf(HasSubstr("'bounds'"), HasSubstr("true or false")));
   EXPECT_THAT(mistake_with({{"trace", 3}}), AllOf(HasSubstr("'trace'"), HasSubstr("folder")));
-  EXPECT_THAT(mistake_with({{"events", "csv"}}),
-              AllOf(HasSubstr("'events'"), HasSubstr("csv"), HasSubstr("redag, jsonl")));
   EXPECT_THAT(mistake_with({{"picture", true}}), AllOf(HasSubstr("'picture'"), HasSubstr("auto, always, never")));
   EXPECT_THAT(mistake_with({{"trace_events", 0}}), AllOf(HasSubstr("'trace_events'"), HasSubstr("from 1")));
   EXPECT_THAT(mistake_with({{"metrics_period", std::numeric_limits<double>::quiet_NaN()}}),

@@ -78,18 +78,6 @@ class Examples(Case):
             return
         self.expect(redag(*RESULTS[place], "--out", place, cwd=self.folder), 0)
 
-    def killed_run(self):
-        """A run that was killed while it recorded."""
-        process = subprocess.Popen([PROGRAM, "run", self.cart, "--duration", "60s", "--out", "results/os"], cwd=self.folder,
-                                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        flight = self.folder / "results" / "os" / "flight"
-        deadline = time.monotonic() + 60
-        while not (flight.exists() and sum(file.stat().st_size for file in flight.iterdir()) > 0):
-            self.assertLess(time.monotonic(), deadline)
-            time.sleep(0.05)
-        time.sleep(1)
-        process.kill()
-        process.wait()
 
     def running_executor(self):
         """Returns the process ID of a run that `redag top` can watch. The first call starts it."""
@@ -142,11 +130,9 @@ class Examples(Case):
     def run_example(self, command, example):
         shutil.rmtree(self.folder / "results", ignore_errors=True)
         for place in set(re.findall(r"results/[a-z]+(?:-\d)?", example)):
-            if command[0] == "recover" or f"--out {place}" in example:
+            if f"--out {place}" in example:
                 continue
             self.make(place)
-        if command[0] == "recover":
-            self.killed_run()
         result = subprocess.run(["bash", "-c", f"set -o pipefail; {self.adapted(command, example)}"], cwd=self.folder,
                                 text=True, env=self.environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=250,
                                 stdin=subprocess.DEVNULL, check=False)

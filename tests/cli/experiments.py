@@ -13,7 +13,7 @@ import signal
 import subprocess
 import unittest
 
-from program import CART, PROGRAM, SANITIZED, SOURCE, Case, in_terminal, interrupt, main, redag, units,\
+from program import CART, PROGRAM, SANITIZED, SOURCE, Case, changed_run, in_terminal, interrupt, main, redag, units,\
     wait_for_units
 
 ACCEPTANCE = """\
@@ -282,7 +282,7 @@ class Factorial(Experiments):
                           "workloads: cart.yaml\nexecutors: [ideal, redag-none, mte, ste, simulator/mte]\n")
         program = self.write("run_workload", f"""#!/bin/sh
 executor=${{2#--executor=}} duration=${{3#--duration=}} warm_up=${{4#--warm-up=}} seed=${{5#--seed=}} out=${{6#--out=}}
-exec "{PROGRAM}" simulate "$1" --executor "$executor" --duration "$duration" --warm-up "$warm_up" --seed "$seed" --events jsonl --out "$out"
+exec "{PROGRAM}" simulate "$1" --executor "$executor" --duration "$duration" --warm-up "$warm_up" --seed "$seed" --out "$out"
 """)
         program.chmod(0o755)
         self.run_plan(plan, "ros2", "--run-workload", program)

@@ -18,6 +18,7 @@ import tempfile
 import termios
 import time
 import unittest
+import zlib
 
 if len(sys.argv) < 3:
     sys.exit(f"usage: {sys.argv[0]} PROGRAM SOURCE_DIR [unittest arguments]")
@@ -57,6 +58,17 @@ def body(text):
     document = json.loads(text)
     del document["provenance"]
     return json.dumps(document)
+
+
+def changed_run(events, old, new):
+    """Returns the bytes of an events.redag with a change in the description of the run."""
+    size, = struct.unpack_from("<I", events, 16 + 8)
+    text = zlib.decompress(events[48:48 + size]).decode()
+    if old not in text:
+        raise AssertionError(f"the run has no {old}")
+    packed = zlib.compress(text.replace(old, new, 1).encode())
+    header = struct.pack("<III", 1, len(packed), len(text) - len(old) + len(new)) + events[32:48]
+    return events[:16] + struct.pack("<I", zlib.crc32(header + packed)) + header + packed + events[48 + size:]
 
 
 def interrupt(process, after=0.0, by=signal.SIGINT):

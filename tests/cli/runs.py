@@ -408,47 +408,39 @@ class Killed(Case):
     def killed_run(self, out, *arguments):
         process = subprocess.Popen([PROGRAM, "run", self.cart, "--duration", "1h", "--preemption", "none", "--out", out,
                                     *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        record = out / "flight" / "events.bin"
+        record = out / "events.redag"
         for _ in range(2000):  # until several collections are recorded
-            if "--no-flight" in arguments and out.exists() or record.exists() and record.stat().st_size > 4 * 4096:
+            if record.exists() and record.stat().st_size > 8000:
                 break
             time.sleep(0.02)
+        self.assertIn("still goes on", redag("check-trace", out).stderr)
         process.kill()
         process.wait()
 
-    def test_its_record_becomes_results(self):
+    def test_its_record_is_read_like_results(self):
         out = self.folder / "out"
         self.killed_run(out)
-        self.assertEqual([path.name for path in out.iterdir()], ["flight"])
-        self.expect(redag("check-trace", out), 2, f"redag recover {out}")
-        self.expect(redag("run", self.cart, "--duration", "100ms", "--out", out), 2, "redag recover")
-        self.expect(redag("recover", out / "flight"), 2, "--out")
-        elsewhere = self.folder / "rescued"
-        document = self.document(redag("recover", out, "--keep", "--json", "--out", elsewhere), "redag.summary/2")
-        self.assertGreater(document["total"]["finished"], 10)
-        self.assertTrue(document["check"]["ok"])
-        result = self.expect(redag("recover", out), 0)
-        self.assertIn("trace check: ok", result.stdout)
-        names = ["events.redag", "jobs.csv", "summary.json", "trace.pftrace"]
-        for folder in out, elsewhere:
-            self.assertEqual(sorted(path.name for path in folder.iterdir()), names)
-        self.expect(redag("check-trace", out), 0)
-        self.assertEqual(redag("events", out).stdout.splitlines()[1:], redag("events", elsewhere).stdout.splitlines()[1:])
-        self.expect(redag("recover", out), 2, "no record of a run")
+        self.assertEqual([path.name for path in out.iterdir()], ["events.redag"])
+        self.assertIn("the run was killed, or still goes on", self.expect(redag("check-trace", out), 0).stderr)
+        self.assertIn("the run was killed", self.expect(redag("why", out), 0).stderr)
+        text = self.expect(redag("report", out, "--json"), 0).stdout
+        self.assertIn("the record ends here: the run was killed", text)
+        jobs = self.folder / "jobs.csv"
+        self.expect(redag("events", out, "--format", "jobs", "-o", jobs), 0)
+        self.assertGreater(len(jobs.read_text().splitlines()), 10)
 
-    def test_a_record_is_given_up_by_force(self):
+    def test_another_run_leaves_it(self):
         out = self.folder / "out"
         self.killed_run(out)
-        self.expect(redag("run", self.cart, "--duration", "100ms", "--out", out, "--force"), 0)
-        self.assertFalse((out / "flight").exists())
-
-    def test_without_a_record(self):
-        out = self.folder / "out"
-        self.killed_run(out, "--no-flight")
-        self.assertEqual(list(out.iterdir()), [])
+        result = self.expect(redag("run", self.cart, "--duration", "100ms", "--out", out), 0)
+        self.assertIn("an earlier run did not end normally", result.stderr)
+        self.assertEqual(sorted(path.name for path in out.iterdir()),
+                         ["events.1.redag", "events.redag", "jobs.csv", "summary.json", "trace.pftrace"])
+        self.assertEqual(self.expect(redag("check-trace", out), 0).stderr, "")
+        self.expect(redag("why", out / "events.1.redag"), 0)
 
     def test_a_small_record_keeps_the_newest(self):
-        self.expect(redag("run", self.cart, "--flight-size", "0", "--out", self.folder / "out"), 2, "--flight-size")
+        self.expect(redag("run", self.cart, "--record-size", "0", "--out", self.folder / "out"), 2, "--record-size")
 
 
 class Compare(Case):

@@ -14,7 +14,7 @@ import subprocess
 from program import CART, MISTAKEN, PROGRAM, SOURCE, Case, main, redag
 
 COMMANDS = [["validate"], ["generate"], ["simulate"], ["run"], ["calibrate"], ["compare"], ["analyze"], ["sensitivity"], ["tune"],
-            ["check-trace"], ["recover"], ["events"], ["why"], ["top"], ["serve"], ["report"], ["experiment"]]
+            ["check-trace"], ["events"], ["why"], ["top"], ["serve"], ["report"], ["experiment"]]
 
 
 class Usage(Case):

@@ -14,7 +14,7 @@ void comparison_target(std::string_view input) {
   static const bool once = [] {
     for (const char *executor : {"redag", "mte"}) {
       std::filesystem::create_directory(scratch_folder() + "/" + executor);
-      scratch_file(std::string(executor) + "/events.jsonl", "");
+      scratch_file(std::string(executor) + "/events.redag", "");
     }
     return true;
   }();

@@ -17,9 +17,7 @@ void workload_target(std::string_view input);
 void robot_target(std::string_view input);
 /// Reads plans of experiments.
 void plan_target(std::string_view input);
-/// Reads events.jsonl, and makes everything that is made of a trace: checks, summary, jobs.csv, Perfetto, report.
-void trace_target(std::string_view input);
-/// Reads events.redag.
+/// Reads events.redag, and makes everything that is made of a trace: checks, summary, jobs.csv, Perfetto, report.
 void events_target(std::string_view input);
 /// Reads the text of a kernel's record, and follows threads in it.
 void kernel_record_target(std::string_view input);
@@ -33,8 +31,6 @@ void units_target(std::string_view input);
 void live_page_target(std::string_view input);
 /// Reads what an executor states of its rates.
 void order_page_target(std::string_view input);
-/// Recovers the record of a killed run, and makes results of it.
-void flight_target(std::string_view input);
 /// Parses values of the command line and of files: durations, processors, utilizations, patterns of ROS names.
 void values_target(std::string_view input);
 /// Runs every subcommand on a workload that the loader accepts.
@@ -46,13 +42,12 @@ struct Target {
 };
 
 inline constexpr std::array kTargets = {
-    Target{"workload", workload_target}, Target{"plan", plan_target},
-    Target{"trace", trace_target},       Target{"events", events_target},
-    Target{"jobs_csv", jobs_csv_target}, Target{"comparison", comparison_target},
-    Target{"units", units_target},       Target{"live_page", live_page_target},
-    Target{"values", values_target},     Target{"commands", commands_target},
-    Target{"flight", flight_target},     Target{"kernel_record", kernel_record_target},
-    Target{"robot", robot_target},       Target{"order_page", order_page_target},
+    Target{"workload", workload_target},     Target{"plan", plan_target},
+    Target{"events", events_target},         Target{"jobs_csv", jobs_csv_target},
+    Target{"comparison", comparison_target}, Target{"units", units_target},
+    Target{"live_page", live_page_target},   Target{"values", values_target},
+    Target{"commands", commands_target},     Target{"kernel_record", kernel_record_target},
+    Target{"robot", robot_target},           Target{"order_page", order_page_target},
 };
 
 }  // namespace redag::fuzz

@@ -1,11 +1,10 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Explores every interleaving of a writer with readers that share data: LatestValue and BoundedQueue. The value that
-// they pass notices whether it is read while it is written.
+// Explores every interleaving of the two ends of a ring. The value that they pass notices whether it is read while it
+// is written.
 #include "protocol.hpp"
-#include "redag/runtime/bounded_queue.hpp"
-#include "redag/runtime/latest_value.hpp"
+#include "redag/trace/ring.hpp"
 
 namespace redag::model_check {
 namespace {
@@ -48,86 +47,26 @@ class Watched {
   testing::ObjectId object_ = explored::new_object();
 };
 
-// Reads `times` times. What it sees is never older than what it saw before, or than what was there when it began.
-void read_several(runtime::LatestValue<Watched>::Reader &reader, int times) {
-  for (int last = 0; times > 0; --times) {
-    const int seen = reader.read().get();
-    explored::check(seen >= last, "a reader sees an older value than before");
-    last = seen;
-  }
-}
-
-TEST(DataProtocol, AReaderSeesWholeValuesInOrder) {
+TEST(DataProtocol, ARingLosesAndRepeatsNothing) {
   expect_holds([] {
-    runtime::LatestValue<Watched> value;
-    auto writer = value.writer();
-    auto reader = value.reader();
-    const std::uint32_t thread = spawn([&] { read_several(reader, 2); });
-    for (int i = 1; i <= 3; ++i) writer.write(i);
-    explored::join(thread);
-    explored::check(reader.read().get() == 3, "the last value is not the latest");
-  });
-}
-
-TEST(DataProtocol, TwoReadersSeeWholeValuesInOrder) {
-  expect_holds([] {
-    runtime::LatestValue<Watched> value(0, 2);
-    auto writer = value.writer();
-    auto first = value.reader();
-    auto second = value.reader();
-    const std::uint32_t a = spawn([&] { read_several(first, 2); });
-    const std::uint32_t b = spawn([&] { read_several(second, 1); });
-    for (int i = 1; i <= 3; ++i) writer.write(i);
-    explored::join(a);
-    explored::join(b);
-    explored::check(first.read().get() == 3 && second.read().get() == 3, "the last value is not the latest");
-  });
-}
-
-TEST(DataProtocol, AReadThatBeginsAfterAWriteSeesIt) {
-  expect_holds([] {
-    runtime::LatestValue<Watched> value;
-    auto writer = value.writer();
-    auto reader = value.reader();
-    int written = 0;
-    const testing::ObjectId object = explored::new_object();
-    const std::uint32_t thread = spawn([&] {
-      explored::read(object, "what is written");
-      const int least = written;
-      explored::check(reader.read().get() >= least, "a read misses a write that was over before it began");
-    });
-    for (int i = 1; i <= 2; ++i) {
-      writer.write(i);
-      explored::write(object, "written");
-      written = i;
-    }
-    explored::join(thread);
-  });
-}
-
-TEST(DataProtocol, AQueueLosesAndRepeatsNothing) {
-  expect_holds([] {
-    runtime::BoundedQueue<Watched> queue(2);
-    auto writer = queue.writer();
-    auto reader = queue.reader();
+    trace::RingOf<Watched> ring(2);
     int pushed = 0;
     const std::uint32_t thread = spawn([&] {
       for (int i = 1; i <= 3; ++i) {
-        if (!writer.push(Watched(i))) return;  // the queue is full: the reader has taken fewer than two less than i
+        if (!ring.push(Watched(i))) return;  // the ring is full: the reader has taken fewer than two less than i
         pushed = i;
       }
     });
     int taken = 0;
-    for (int tries = 0; tries < 3; ++tries) {
-      if (const auto value = reader.pop()) {
-        explored::check(value->get() == taken + 1, "values come in another order, or are lost");
-        ++taken;
-      }
-    }
+    const auto take = [&] {
+      Watched value;
+      if (ring.pop({&value, 1}) == 0) return false;
+      explored::check(value.get() == ++taken, "values come in another order, or are lost");
+      return true;
+    };
+    for (int tries = 0; tries < 3; ++tries) take();
     explored::join(thread);
-    while (const auto value = reader.pop()) {
-      explored::check(value->get() == taken + 1, "values come in another order, or are lost");
-      ++taken;
+    while (take()) {
     }
     explored::check(taken == pushed, "a value is lost");
   });

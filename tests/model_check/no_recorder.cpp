@@ -29,7 +29,7 @@ Result<void> Recorder::finish(Time) {
 // A Recorder needs no more of its record.
 namespace redag::trace {
 
-class FlightRecorder::Impl {};
-FlightRecorder::~FlightRecorder() = default;
+class EventsWriter::Impl {};
+EventsWriter::~EventsWriter() = default;
 
 }  // namespace redag::trace

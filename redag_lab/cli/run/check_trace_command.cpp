@@ -9,6 +9,7 @@
 #include "redag/trace/events_file.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"
 #include "redag_analysis/text/table.hpp"
+#include "redag_lab/cli/run/recorded_runs.hpp"
 #include "redag_lab/cli/run/run_report.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/files.hpp"
@@ -72,6 +73,7 @@ class Checking {
       report_unreadable(file, reader.error());
       return;
     }
+    warn_of_remarks(reader->info(), console_);
     const Result<metrics::CheckReport> report = check_events(*reader);
     if (!report) {
       report_unreadable(file, report.error());
@@ -102,8 +104,7 @@ class Checking {
 
 Action add_check_trace(CLI::App &app) {
   auto options = std::make_shared<CheckTraceOptions>();
-  app.add_option("PLACE", options->places,
-                 "Traces (events.redag, events.jsonl), or folders that hold traces at any depth")
+  app.add_option("PLACE", options->places, "Traces (events.redag), or folders that hold traces at any depth")
       ->type_name("RESULT")
       ->required();
   app.add_flag("--json", options->json, "Write the verdicts as one JSON document");

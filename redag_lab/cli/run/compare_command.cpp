@@ -204,8 +204,7 @@ class Comparing {
     text += fmt::format(
         "  {}/{}summary.json, {}\n"
         "      every job; the folders beside it hold the other executors\n",
-        first, options_.run.jobs ? "jobs.csv, " : "",
-        options_.run.events_as_text ? trace::kEventsTextFile : trace::kEventsFile);
+        first, options_.run.jobs ? "jobs.csv, " : "", trace::kEventsFile);
     if (options_.run.json) {
       console_.note(text);
     } else {

@@ -15,6 +15,7 @@
 
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/output_file.hpp"
+#include "redag/trace/run_info_json.hpp"
 #include "redag_analysis/metrics/jobs_csv.hpp"
 #include "redag_lab/cli/run/recorded_runs.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
@@ -26,7 +27,7 @@
 namespace redag::cli {
 namespace {
 
-enum class Format : std::uint8_t { Jsonl, Csv, Redag, Jobs, Perfetto };
+enum class Format : std::uint8_t { Jsonl, Csv, Jobs, Perfetto };
 
 struct EventsOptions {
   std::string place;
@@ -52,22 +53,32 @@ class TextConverter final : public Converter {
         file_(std::move(file)),
         console_(console),
         names_(metrics::csv_task_names(reader.info().workload)) {
-    write(is_csv_ ? "time_ns,kind,dag,task,job,worker,value_ns,reason\n" : trace::events_header(reader.info()));
+    write(is_csv_ ? "time_ns,kind,dag,task,job,worker,value_ns,reason\n"
+                  : trace::run_header_to_json("redag.events/1", reader.info()) + "\n");
   }
 
   void add(std::span<const JobEvent> events) override {
     std::string text;
-    for (const JobEvent &event : events) is_csv_ ? append_row(event, text) : trace::append_event_line(event, text);
+    for (const JobEvent &event : events) is_csv_ ? append_row(event, text) : append_line(event, text);
     write(text);
   }
 
   Result<void> commit() override {
     const trace::RunInfo &run = reader_.info();
-    if (!is_csv_) write(trace::events_footer(reader_.events(), run.end, run.lost_events));
+    if (!is_csv_) {
+      write(fmt::format("{{\"events\":{},\"end_ns\":{},\"lost_events\":{}}}\n", reader_.events(), run.end,
+                        run.lost_events));
+    }
     return file_ ? file_->commit() : Result<void>();
   }
 
  private:
+  static void append_line(const JobEvent &event, std::string &text) {
+    const std::int64_t worker = event.worker == WorkerId::kNoneValue ? -1 : std::int64_t{event.worker};
+    fmt::format_to(std::back_inserter(text), FMT_COMPILE("[{},\"{}\",{},{},{},{},\"{}\"]\n"), event.time,
+                   to_string(event.kind), event.task.value, event.job, worker, event.value, to_string(event.reason));
+  }
+
   void append_row(const JobEvent &event, std::string &text) const {
     fmt::format_to(std::back_inserter(text), FMT_COMPILE("{},{},{},{},"), event.time, to_string(event.kind),
                    names_[event.task.value], event.job);
@@ -84,18 +95,6 @@ class TextConverter final : public Converter {
   std::vector<std::string> names_;  // by TaskId
 };
 
-/// events.redag.
-class CompressingConverter final : public Converter {
- public:
-  CompressingConverter(trace::EventsWriter writer, const trace::RunInfo &run) : writer_(std::move(writer)), run_(run) {}
-  void add(std::span<const JobEvent> events) override { writer_.add(events); }
-  Result<void> commit() override { return writer_.commit(run_.end, run_.lost_events); }
-
- private:
-  trace::EventsWriter writer_;
-  const trace::RunInfo &run_;
-};
-
 /// jobs.csv.
 class JobsConverter final : public Converter {
  public:
@@ -109,11 +108,6 @@ class JobsConverter final : public Converter {
 
 Result<std::unique_ptr<Converter>> converter_for(const EventsOptions &options, const trace::EventsReader &reader,
                                                  Console &console) {
-  if (options.format == Format::Redag) {
-    Result<trace::EventsWriter> writer = trace::EventsWriter::create(options.output, reader.info());
-    if (!writer) return tl::unexpected<Diagnostics>(std::move(writer.error()));
-    return std::make_unique<CompressingConverter>(*std::move(writer), reader.info());
-  }
   if (options.format == Format::Jobs) {
     Result<metrics::JobsCsvWriter> writer = metrics::JobsCsvWriter::create(options.output, reader.info().workload);
     if (!writer) return tl::unexpected<Diagnostics>(std::move(writer.error()));
@@ -133,10 +127,7 @@ Result<void> check_place(const EventsOptions &options) {
   namespace fs = std::filesystem;
   if (options.output.empty()) {
     if (options.format == Format::Jsonl || options.format == Format::Csv) return {};
-    return make_error("--format: redag, jobs and perfetto are not printed", "name a file with -o");
-  }
-  if ((options.format == Format::Redag) != options.output.ends_with(".redag")) {
-    return make_error("-o: files of the format 'redag', and no others, are called *.redag");
+    return make_error("--format: jobs and perfetto are not printed", "name a file with -o");
   }
   std::error_code ignored;
   const fs::file_status status = fs::symlink_status(options.output, ignored);
@@ -153,6 +144,7 @@ Result<void> convert(const EventsOptions &options, Console &console) {
   console.note(chosen->note);
   Result<trace::EventsReader> reader = trace::EventsReader::open(chosen->file);
   if (!reader) return tl::unexpected<Diagnostics>(std::move(reader.error()));
+  warn_of_remarks(reader->info(), console);
   const InterruptGuard guard;
   if (options.format == Format::Perfetto) {
     return lab::draw_picture(*reader, options.output, InterruptGuard::interrupted);
@@ -176,11 +168,8 @@ Action add_events(CLI::App &app) {
   auto options = std::make_shared<EventsOptions>();
   app.add_option("RESULT", options->place, "Folder of a recorded run (--out of run, simulate), or its events")
       ->required();
-  const Choices<Format> formats{{"jsonl", Format::Jsonl},
-                                {"csv", Format::Csv},
-                                {"redag", Format::Redag},
-                                {"jobs", Format::Jobs},
-                                {"perfetto", Format::Perfetto}};
+  const Choices<Format> formats{
+      {"jsonl", Format::Jsonl}, {"csv", Format::Csv}, {"jobs", Format::Jobs}, {"perfetto", Format::Perfetto}};
   add_choice(app, "--format", options->format, formats, "Format of the output (jobs: jobs.csv, a row for each job)");
   app.add_option("-o,--output", options->output, "File to write; by default the text is printed")->type_name("FILE");
   return [options](Console &console) {

@@ -156,4 +156,11 @@ Result<ChosenRun> choose_run(const std::string &place) {
                                                     folder_of(first.traces[worst]), why)};
 }
 
+void warn_of_remarks(const trace::RunInfo &run, Console &console) {
+  for (const trace::Remark &remark : run.remarks) {
+    console.warn(
+        fmt::format("noticed {} after the start: {}", humanize_duration(remark.begun - run.start), remark.text));
+  }
+}
+
 }  // namespace redag::cli

@@ -87,11 +87,6 @@ void add_result_arguments(CLI::App &app, RunArguments &arguments) {
   add_count(app, "--max-events", arguments.max_events, {1, kMaxEvents},
             "Number of events to check and write; later events count in the summary only")
       ->group(kResultGroup);
-  const Choices<bool> forms{{"redag", false}, {"jsonl", true}};
-  add_choice(app, "--events", arguments.events_as_text, forms,
-             "Form of the events: events.redag (compressed), or events.jsonl (text)")
-      ->needs(folder)
-      ->group(kResultGroup);
   const Choices<bool> writes{{"always", true}, {"never", false}};
   add_choice(app, "--jobs", arguments.jobs, writes, "Write jobs.csv, a row for each job, most of a long run's results")
       ->needs(folder)
@@ -288,27 +283,18 @@ std::optional<lab::SessionOptions> session_options(const RunArguments &arguments
     }
   }
   if (!arguments.folder.empty()) {
-    if (arguments.flight) options.flight = flight_folder(arguments.folder);
-    options.flight_bytes = std::uint64_t{arguments.flight_mib} << 20U;
+    if (arguments.record) options.record = fmt::format("{}/{}", arguments.folder, trace::kEventsFile);
+    options.record_bytes = std::uint64_t{arguments.record_mib} << 20U;
     if (const Result<void> made = prepare_folder(arguments.folder, arguments.force); !made) {
       console.note(made.error());
       return std::nullopt;
-    }
-    if (arguments.force && arguments.flight) {
-      if (const Result<void> removed = trace::remove_flight_record(options.flight); !removed) {
-        console.note(removed.error());
-        return std::nullopt;
-      }
     }
   }
   return options;
 }
 
 metrics::FilesOptions files_options(const RunArguments &arguments, const std::string &folder) {
-  return {.folder = folder,
-          .events_as_text = arguments.events_as_text,
-          .jobs = arguments.jobs,
-          .picture = arguments.picture};
+  return {.folder = folder, .jobs = arguments.jobs, .picture = arguments.picture};
 }
 
 lab::ProgressHook progress_hook(Progress &progress, const Workload &workload, Duration duration) {

@@ -42,11 +42,10 @@ struct RunArguments {
   bool live = false;
   bool json = false;
   std::string folder;
-  bool events_as_text = false;
   bool jobs = true;
   metrics::Picture picture = metrics::Picture::Auto;
-  bool flight = false;  // records the run in `folder` while it runs
-  std::uint32_t flight_mib = static_cast<std::uint32_t>(trace::FlightOptions{}.most_bytes >> 20U);
+  bool record = false;  // records the run in `folder` while it runs
+  std::uint32_t record_mib = static_cast<std::uint32_t>(trace::kMostRecordBytes >> 20U);
   bool force = false;
   bool check = false;
   bool all_tasks = false;

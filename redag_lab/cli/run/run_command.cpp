@@ -11,7 +11,7 @@ namespace redag::cli {
 
 namespace {
 
-constexpr std::uint32_t kMaxFlightMib = 1U << 20U;
+constexpr std::uint32_t kMaxRecordMib = 1U << 20U;
 
 }  // namespace
 
@@ -31,12 +31,9 @@ Action add_run(CLI::App &app) {
   app.add_flag("--live,!--no-live", arguments->live,
                "Let 'redag top' show the run; costs a page of memory and two updates a second")
       ->group("Threads");
-  arguments->flight = true;
-  app.add_flag("--flight,!--no-flight", arguments->flight,
-               "With --out, record events during the run, so that 'redag recover' can restore a killed run")
-      ->group("Results");
-  add_count(app, "--flight-size", arguments->flight_mib, {1, kMaxFlightMib},
-            "Size of that record in MiB; when it is full, new events replace the oldest")
+  arguments->record = true;
+  add_count(app, "--record-size", arguments->record_mib, {1, kMaxRecordMib},
+            "Size of the events on disk during the run, in MiB; then new events replace the oldest")
       ->needs(&option_named(app, "--out"))
       ->group("Results");
   return [arguments, executor](Console &console) {

@@ -69,11 +69,6 @@ int run_once(const RunArguments &arguments, const std::string &executor, trace::
   bool written = true;
   if (!arguments.folder.empty()) {
     WrittenFiles files = write_session(*session, options->files);
-    // The flight record remains while results are missing.
-    if (files.problems.empty() && !options->flight.empty()) {
-      if (const Result<void> removed = trace::remove_flight_record(options->flight); !removed)
-        files.problems = removed.error();
-    }
     console.note(files.problems);
     written = files.problems.empty();
     std::string message = fmt::format("wrote {}/: {}\n", arguments.folder, files.names) + files.no_picture;

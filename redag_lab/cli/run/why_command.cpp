@@ -55,6 +55,7 @@ class Explaining {
     if (!trace) return tl::unexpected<Diagnostics>(trace.error());
     const Result<std::optional<metrics::KernelRecord>> kernel = kernel_record(trace->info());
     if (!kernel) return tl::unexpected<Diagnostics>(kernel.error());
+    warn_of_remarks(trace->info(), console_);
     if (trace->info().lost_events > 0) {
       console_.warn(fmt::format("{} events of this run were lost: explanations can be wrong",
                                 format_count(trace->info().lost_events)));

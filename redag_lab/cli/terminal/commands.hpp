@@ -31,7 +31,6 @@ Action add_tune(CLI::App &app);
 Action add_experiment(CLI::App &app);
 Action add_check_trace(CLI::App &app);
 Action add_events(CLI::App &app);
-Action add_recover(CLI::App &app);
 Action add_report(CLI::App &app);
 Action add_top(CLI::App &app);
 Action add_serve(CLI::App &app);

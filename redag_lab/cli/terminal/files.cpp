@@ -35,8 +35,6 @@ Result<void> write_in_place(const std::string &path, std::string_view text) {
   return trace::file_error(path, 0, fmt::format("cannot write: {}", std::strerror(errno)));
 }
 
-constexpr const char *kFlightName = "flight";
-
 // True if the text consists of digits, such as "007" of "mte_007".
 bool is_number(std::string_view text) {
   return !text.empty() && std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
@@ -79,39 +77,25 @@ Result<std::vector<std::string>> find_traces(const std::string &place) {
   fs::recursive_directory_iterator entry(place, error);
   for (const fs::recursive_directory_iterator end; !error && entry != end; entry.increment(error)) {
     if (entry->path().filename() == trace::kEventsFile) files.push_back(entry->path().string());
-    if (entry->path().filename() != trace::kEventsTextFile) continue;
-    // Beside the other form it is that of an earlier run.
-    std::error_code ignored;
-    if (!fs::exists(entry->path().parent_path() / trace::kEventsFile, ignored)) files.push_back(entry->path().string());
   }
   if (error) return trace::file_error(place, 0, fmt::format("cannot list the folder: {}", error.message()));
-  if (files.empty() && fs::exists(flight_folder(place), error)) {
-    return trace::file_error(place, 0, "this folder holds no events.redag, only the record of a run that did not end",
-                             fmt::format("'redag recover {}' restores its results", place));
-  }
   if (files.empty()) {
-    return trace::file_error(place, 0, "no events.redag or events.jsonl in this folder or below it",
+    return trace::file_error(place, 0, "no events.redag in this folder or below it",
                              "'redag run', 'simulate' and 'compare' write one with '--out DIR'");
   }
   std::sort(files.begin(), files.end());
   return files;
 }
 
-std::string flight_folder(const std::string &folder) { return folder + "/" + kFlightName; }
-
 bool is_result_name(std::string_view name) {
-  if (name == kFlightName) return true;
   // A killed command can leave files that end in ".tmp.<pid>".
   if (const std::size_t at = name.rfind(".tmp."); at != std::string_view::npos && is_number(name.substr(at + 5))) {
     name = name.substr(0, at);
   }
-  constexpr std::array<std::string_view, 17> kNames = {
-      "jobs.csv",        "summary.json",    "trace.pftrace",
-      "trace.json",  // of earlier versions
-      "events.redag",    "events.jsonl",    "workload.yaml", "comparison.json",
-      "comparison.csv",  "comparison.html", "report.html",   "check.json",
-      "kernel.jsonl",  // of earlier versions
-      "kernel.jsonl.gz", "units.csv",       "results.csv",   "results.json"};
+  constexpr std::array<std::string_view, 13> kNames = {
+      "jobs.csv",        "summary.json",   "trace.pftrace",   "events.redag", "workload.yaml",
+      "comparison.json", "comparison.csv", "comparison.html", "report.html",  "check.json",
+      "units.csv",       "results.csv",    "results.json"};
   if (std::find(kNames.begin(), kNames.end(), name) != kNames.end()) return true;
   // Folders of a comparison (executors, and repetitions below them), and the files of `generate`.
   const std::vector<std::string> &executors = lab::variant_names();
@@ -122,7 +106,8 @@ bool is_result_name(std::string_view name) {
            is_number(name.substr(prefix.size(), name.size() - prefix.size() - suffix.size()));
   };
   if (name.starts_with("units-") && name.ends_with(".csv")) return true;  // of a share of an experiment
-  return is_numbered("repetition-", "") || is_numbered("workload-", ".yaml") || is_numbered("violation-", ".yaml");
+  return is_numbered("repetition-", "") || is_numbered("workload-", ".yaml") || is_numbered("violation-", ".yaml") ||
+         is_numbered("events.", ".redag");  // of killed runs
 }
 
 Result<void> prepare_folder(const std::string &path, bool force) {

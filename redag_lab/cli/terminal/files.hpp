@@ -24,10 +24,7 @@ namespace redag::cli {
 /// written, or holds a file that this program does not write, by name (unless `force`). Nothing is deleted.
 [[nodiscard]] Result<void> prepare_folder(const std::string &path, bool force);
 
-/// Returns the place in a result folder where `redag run` records a run while it runs (trace/flight_recorder.hpp).
-[[nodiscard]] std::string flight_folder(const std::string &folder);
-
-/// Returns the traces at a place, sorted: the file itself, or every events.redag and events.jsonl in the folder and
+/// Returns the traces at a place, sorted: the file itself, or every events.redag in the folder and
 /// below. Error: none found.
 [[nodiscard]] Result<std::vector<std::string>> find_traces(const std::string &place);
 

@@ -48,7 +48,7 @@ TEST(Variant, RejectsUnknownAndRepeatedNames) {
 
 TEST(ResultName, IsKnownEvenHalfWritten) {
   EXPECT_TRUE(is_result_name("summary.json"));
-  EXPECT_TRUE(is_result_name("events.jsonl.tmp.4711"));
+  EXPECT_TRUE(is_result_name("events.redag.tmp.4711"));
   EXPECT_TRUE(is_result_name("redag-os"));
   EXPECT_TRUE(is_result_name("repetition-12"));
   EXPECT_TRUE(is_result_name("workload-7.yaml"));

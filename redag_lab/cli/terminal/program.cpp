@@ -83,9 +83,6 @@ constexpr std::array kCommands = {
           "  redag events results/demo | head\n"
           "  redag events results/demo --format csv -o events.csv\n"
           "  redag events results/demo --format perfetto -o results/demo/trace.pftrace\n"},
-    Entry{"recover", "Recover the results of a run that was killed", add_recover,
-          "  redag recover results/os\n"
-          "  redag recover results/os --out results/rescued --keep\n"},
     Entry{"why", "Explain why deadlines of a recorded run were missed", add_why,
           "  redag why results/demo\n"
           "  redag why results/demo control.controller\n"

@@ -29,7 +29,6 @@ struct MonitorOptions {
   /// Folder for events.redag, jobs.csv, summary.json, trace.pftrace and metrics.json; created if missing. "": no files.
   /// Needs ReDAGOptions::trace_capacity.
   std::string trace{};
-  bool events_as_text = false;    // events.jsonl instead of events.redag
   std::optional<bool> picture{};  // whether there is a trace.pftrace; unset: of traces with at most 500,000 events
   std::size_t trace_events = 10'000'000;  // number of first events that are kept, at 32 bytes each
   std::string metrics_file{};             // file for the last snapshot; "": none besides the one in `trace`

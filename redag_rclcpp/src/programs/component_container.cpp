@@ -81,8 +81,6 @@ Parameters, with their defaults:
                          ~/metrics; 0: no messages
   bounds true            compare response times with their bounds
   trace ""               folder for results, written at the end
-  events redag           form of the trace's events: redag (compressed) or
-                         jsonl (text)
   picture auto           trace.pftrace: auto (of at most 500 000 events),
                          always or never
   trace_events 10000000  number of events kept for the trace
