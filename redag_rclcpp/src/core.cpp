@@ -39,23 +39,6 @@ constexpr redag::Duration kThreadsAppear = redag::kSecond;    // after a start o
 
 rclcpp::Logger logger() { return rclcpp::get_logger("redag_rclcpp"); }
 
-/// One callback at a time, and nothing that depends on how long callbacks take.
-void run_in_lockstep(ReDAGOptions &options) {
-  options.workers = 1;
-  options.preemption = redag::PreemptionMode::None;
-  options.threads = 0;
-  options.spare_threads = 0;
-  options.learn = nanoseconds(0);
-  options.share_order = false;
-  if (!options.workload) return;
-  for (redag::Dag &dag : options.workload->dags) {
-    for (redag::Task &task : dag.tasks) {
-      task.budget = 0;
-      task.wcet_low = 0;
-    }
-  }
-}
-
 /// Checks and completes the workload. Throws std::runtime_error if the workload is invalid, std::invalid_argument for
 /// other options.
 ReDAGOptions prepare(ReDAGOptions options) {
@@ -66,7 +49,6 @@ ReDAGOptions prepare(ReDAGOptions options) {
   if (options.spin < nanoseconds(0)) throw std::invalid_argument("spin must not be negative");
   if (options.watchdog < nanoseconds(0)) throw std::invalid_argument("watchdog must not be negative");
   redag::runtime::check_devices("ReDAGOptions::devices", options.devices);
-  if (options.lockstep) run_in_lockstep(options);
   if (!options.workload) return options;
   const auto findings = redag::validate(*options.workload, redag::ValidateOptions{.wcet_optional = true});
   if (has_errors(findings)) throw std::runtime_error(to_string(findings));
@@ -108,14 +90,6 @@ ReDAGExecutor::Core::Core(const rclcpp::Context::SharedPtr &context, ReDAGOption
           options_.policy, options_.ties, options_.workload ? &*options_.workload : nullptr),
       registry_(context, options_, setup_.config.workers,
                 {.engine = *engine_, .timer = timer_, .bridge = bridge_, .tasks = tasks_}) {
-  if (options_.lockstep) {
-    lockstep_ = std::make_unique<Lockstep>(
-        context_, origin_,
-        Lockstep::Parts{.engine = *engine_,
-                        .registry = registry_,
-                        .wake = [this] { keeper_parker_.unpark(); },
-                        .name_of = [this](redag::TaskId task) { return tasks_.name_of(task); }});
-  }
   engine_->share_releases(timer_.thread());
   for (std::string &warning : setup_.warnings) notes_.warn(std::move(warning));
   setup_.warnings.clear();
@@ -354,15 +328,6 @@ void ReDAGExecutor::Core::spin() {
       report(*middleware, false);
       look_at_middleware_at_ = engine_->now() + kThreadsAppear;
     }
-    const struct Follow {
-      explicit Follow(Lockstep *its) : lockstep(its) {
-        if (lockstep != nullptr) lockstep->open();
-      }
-      ~Follow() {
-        if (lockstep != nullptr) lockstep->close();
-      }
-      Lockstep *lockstep;
-    } follow(lockstep_.get());
     keep_house(middleware ? &*middleware : nullptr);
   } catch (...) {
     // One cause is a context that was shut down while entities were collected.
@@ -379,9 +344,8 @@ void ReDAGExecutor::Core::spin() {
 // Work of spin() on the calling thread, at that thread's own priority: everything that takes long and is not urgent.
 void ReDAGExecutor::Core::keep_house(RaisedMiddleware *middleware) {
   while (hooks_.may_spin() && !wait_set_done_) {
-    const bool is_stale = registry_.is_stale() && !(lockstep_ && lockstep_->in_instant());
+    const bool is_stale = registry_.is_stale();
     if (is_stale) registry_.collect();
-    if (lockstep_) lockstep_->look();
     const redag::Time now = engine_->now();
     if (middleware != nullptr && now >= look_at_middleware_at_) {
       look_at_middleware_at_ = kNever;
@@ -399,11 +363,9 @@ void ReDAGExecutor::Core::keep_house(RaisedMiddleware *middleware) {
       look_for_deadlocks_at_ = now + DeadlockDetector::kInterval;
     }
     if (now >= look_for_deadlocks_at_) look_for_deadlocks();
-    const redag::Time next = std::min({report_unmatched_at_, look_at_middleware_at_, look_for_deadlocks_at_,
-                                       learning_ ? learn_until_ : kNever, lockstep_ ? lockstep_->next_look() : kNever});
-    if (lockstep_ && lockstep_->in_instant()) {
-      lockstep_->wait(next);
-    } else if (next == kNever) {
+    const redag::Time next = std::min(
+        {report_unmatched_at_, look_at_middleware_at_, look_for_deadlocks_at_, learning_ ? learn_until_ : kNever});
+    if (next == kNever) {
       keeper_parker_.park();
     } else if (next > now) {
       keeper_parker_.park_until(origin_ + next);

@@ -20,7 +20,6 @@
 #include "bridge.hpp"
 #include "callback.hpp"
 #include "deadlock_detector.hpp"
-#include "lockstep.hpp"
 #include "middleware_threads.hpp"
 #include "notes.hpp"
 #include "redag/base/lock_guard.hpp"
@@ -90,7 +89,6 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
   [[nodiscard]] std::shared_ptr<Callback> find_in_group(redag::TaskId member, const void *entity) const override {
     return tasks_.find_in_group(member, entity);
   }
-  [[nodiscard]] Lockstep *lockstep() const override { return lockstep_.get(); }
   [[nodiscard]] redag::runtime::DeviceHandle device(const std::string &name) const override;
 
  private:
@@ -124,7 +122,6 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
   Bridge bridge_;
   TaskTable tasks_;
   Registry registry_;
-  std::unique_ptr<Lockstep> lockstep_;  // null unless ReDAGOptions::lockstep
 
   enum class FirstSpin : std::uint8_t { Awaited, Cancelled, Begun };
   std::atomic<FirstSpin> first_spin_{FirstSpin::Awaited};

@@ -341,11 +341,6 @@ ReDAGOptions declare_options(rclcpp::Node &node) {
                                      "this user that do so, also in other processes",
                                      "true or false"},
                                     false);
-  options.lockstep = reader.flag({"lockstep",
-                                  "Run one callback at a time, in the same order in each replay of a recording by "
-                                  "play_lockstep; overrides workers, preemption and learn",
-                                  "true or false"},
-                                 false);
   const bool counts_responses = read_bounds(reader) && options.workload && has_all_wcets(*options.workload);
   if (!read_trace(reader).empty() || counts_responses) options.trace_capacity = kTraceCapacity;
   return options;

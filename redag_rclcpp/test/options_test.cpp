@@ -92,7 +92,6 @@ TEST_F(OptionsTest, Defaults) {
   EXPECT_TRUE(options.deadlocks);
   EXPECT_TRUE(options.live);
   EXPECT_FALSE(options.share_order);
-  EXPECT_FALSE(options.lockstep);
   EXPECT_EQ(options.trace_capacity, 0U);
 
   const MonitorOptions monitor = declare_monitor_options(*node, options);
@@ -122,7 +121,6 @@ TEST_F(OptionsTest, ValuesAreRead) {
                                {"deadlocks", false},
                                {"live", false},
                                {"share_order", true},
-                               {"lockstep", true},
                                {"trace", "results"},
                                {"metrics_period", 0.25},
                                {"events", "jsonl"},
@@ -145,7 +143,6 @@ TEST_F(OptionsTest, ValuesAreRead) {
   EXPECT_EQ(options.spin, 50us);
   EXPECT_EQ(options.watchdog, 2s);
   EXPECT_TRUE(options.share_order);
-  EXPECT_TRUE(options.lockstep);
   EXPECT_FALSE(options.deadlocks);
   EXPECT_FALSE(options.live);
   EXPECT_GT(options.trace_capacity, 0U);
@@ -354,7 +351,7 @@ TEST_F(OptionsTest, ParametersSayWhatTheyAreAndStay) {
                            "cpu_affinity", "config",      "default_period", "learn",          "raise_middleware",
                            "lock_memory",  "spin",        "watchdog",       "metrics_period", "trace",
                            "events",       "picture",     "bounds",         "trace_events",   "metrics_file",
-                           "save_path",    "share_order", "spare_threads",  "lockstep"}) {
+                           "save_path",    "share_order", "spare_threads"}) {
     const auto descriptor = node->describe_parameter(name);
     EXPECT_FALSE(descriptor.description.empty()) << name;
     EXPECT_FALSE(descriptor.additional_constraints.empty()) << name;

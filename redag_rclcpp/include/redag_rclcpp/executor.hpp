@@ -82,10 +82,6 @@ struct ReDAGOptions {
   /// os, rate_monotonic or deadline_monotonic: shares one order with the other executors of this user that do so, also
   /// in other processes. The variable REDAG_SHARE_ORDER overrides it.
   bool share_order = false;
-  /// Runs the callbacks of one instant of simulated time after the other, in an order that each replay repeats, as a
-  /// player announces them (docs/ros2.md, "Replay in lockstep"). One callback at a time: overrides workers, preemption,
-  /// threads, spare_threads, learn and share_order, and leaves out budgets. Takes effect in spin().
-  bool lockstep = false;
   bool live = false;  // shows the executor in `redag top`: a page of shared memory, and a thread that updates it
   /// Called on the thread that executed the callback; must not throw. Empty: Stop.
   std::function<OnException(const ExceptionInfo &)> on_exception{};

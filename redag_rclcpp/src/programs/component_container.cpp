@@ -73,8 +73,6 @@ Parameters, with their defaults:
                          reach them
   live true              let 'redag top' show the executor (a page of memory
                          that only its owner can read)
-  lockstep false         run callbacks in the same order in each replay of a
-                         recording by play_lockstep
   share_order false      with os: share one order of priorities with the
                          executors of other processes that do so
   metrics_period 1.0     seconds between two messages on /diagnostics and
