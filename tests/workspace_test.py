@@ -37,7 +37,7 @@ SYSTEM_KEYS = {
 }
 # Packages of the distributions themselves: ros-<distribution>-<name>.
 ROS_KEYS = {"ament_cmake", "ament_index_python", "composition_interfaces", "diagnostic_msgs", "launch", "launch_ros", "rcl",
-            "pal_statistics_msgs", "rcl_interfaces", "rclcpp", "rclcpp_action", "rclcpp_components", "rclcpp_lifecycle", "rcutils", "rmw",
+            "rcl_interfaces", "rclcpp", "rclcpp_action", "rclcpp_components", "rclcpp_lifecycle", "rcutils", "rmw",
             "rosgraph_msgs", "std_msgs", "std_srvs", "test_msgs", "tracetools"}
 # Names that find_package() looks for, with the rosdep key that installs them. The C library has the threads,
 # and packages are built without MPI and LTTng.
