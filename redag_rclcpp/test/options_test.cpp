@@ -19,6 +19,7 @@
 #include "environment.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "redag/runtime/threads.hpp"
+#include "redag_rclcpp/monitor.hpp"
 
 namespace redag_rclcpp {
 namespace {

@@ -50,6 +50,10 @@ struct MonitorOptions {
   std::optional<redag::Calibration> calibration{};
 };
 
+/// Declares and reads the parameters of a monitor whose executor gets `executor`: metrics_period, metrics_file,
+/// save_path, trace, trace_events, bounds, overheads. See options.hpp.
+[[nodiscard]] MonitorOptions declare_monitor_options(rclcpp::Node &node, const ReDAGOptions &executor);
+
 class Monitor {
  public:
   /// Creates in `node` the publishers /diagnostics and ~/metrics, and the services ~/metrics and ~/save. The executor
