@@ -365,6 +365,16 @@ std::vector<std::string> ReDAGExecutor::Core::warnings() const {
   return all;
 }
 
+std::vector<std::string> ReDAGExecutor::Core::errors() const {
+  std::vector<std::string> errors;
+  if (setup_.mode.mode != redag::PreemptionMode::Os) return errors;
+  if (!setup_.missing_processors.empty()) errors.push_back(setup_.missing_processors);
+  for (redag::runtime::Problem &problem : engine_->problems()) {
+    if (problem.breaks_order) errors.push_back(std::move(problem.text));
+  }
+  return errors;
+}
+
 redag::trace::RunInfo ReDAGExecutor::Core::run_info(std::vector<std::uint32_t> &positions) const {
   redag::trace::RunInfo info;
   info.workload = tasks_.describe(positions);

@@ -69,6 +69,7 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
   [[nodiscard]] const redag::runtime::Setup &setup() const { return setup_; }
   [[nodiscard]] const TaskTable &tasks() const { return tasks_; }
   [[nodiscard]] std::vector<std::string> warnings() const;
+  [[nodiscard]] std::vector<std::string> errors() const;
   [[nodiscard]] std::vector<Deadlock> deadlocks() const { return notes_.deadlocks(); }
   [[nodiscard]] bool learning_done() const { return learning_.done(); }
   void set_live_bounds(std::map<std::string, redag::Duration> bounds) { notes_.set_live_bounds(std::move(bounds)); }

@@ -287,6 +287,19 @@ TEST_P(RealtimeTest, TheWatchdogNamesACallbackThatDoesNotEnd) {
   end.set();
 }
 
+// Only with os do bounds count on as many processors as workers.
+TEST_P(RealtimeTest, MoreWorkersThanProcessorsAreAnErrorWithOs) {
+  options.workers = static_cast<std::uint32_t>(redag::runtime::usable_cpus().size()) + 1;
+  const ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  const auto missing = HasSubstr("processor(s)");
+  EXPECT_THAT(executor.warnings(), Contains(missing));
+  if (GetParam() == redag::PreemptionMode::Os) {
+    EXPECT_THAT(executor.errors(), ::testing::ElementsAre(missing));
+  } else {
+    EXPECT_THAT(executor.errors(), ::testing::IsEmpty());
+  }
+}
+
 TEST_P(RealtimeTest, AnIdleWorkerThatLooksForWorkFindsIt) {
   options.spin = 100us;
   ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);

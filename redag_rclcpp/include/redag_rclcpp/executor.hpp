@@ -157,6 +157,9 @@ class ReDAGExecutor : public rclcpp::Executor {
   /// Warnings for the user: for instance too few processors, tasks of the workload that no callback matches, or
   /// middleware threads that could not be raised.
   [[nodiscard]] std::vector<std::string> warnings() const;
+  /// Those of warnings() that break a promise about deadlines now. With os: more workers than processors, priorities
+  /// that the system refuses, or an order that is lost.
+  [[nodiscard]] std::vector<std::string> errors() const;
 
   /// The deadlocks that were noticed, in the order of their beginning; the last 100. See ReDAGOptions::deadlocks.
   [[nodiscard]] std::vector<Deadlock> deadlocks() const;

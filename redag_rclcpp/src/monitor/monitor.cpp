@@ -165,6 +165,7 @@ Snapshot Monitor::Impl::snapshot() {
   result.policy = config_.policy;
   result.learning = !executor_.learning_done();
   result.warnings = executor_.warnings();
+  result.errors = executor_.errors();
   result.deadlocks = executor_.deadlocks();
   const std::vector<CallbackStats> stats = executor_.stats();
   const redag::LockGuard guard(bounds_lock_);
