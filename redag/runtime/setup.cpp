@@ -118,9 +118,9 @@ Result<Setup> set_up(const SetupRequest &request) {
   const std::uint32_t threads = std::max(request.threads == 0 ? workers + kSpareThreads : request.threads, workers);
   setup.config = make_config(setup.mode, workers, request.policy, setup.band, threads);
   setup.config.ties = request.ties;
-  const bool os = setup.mode.mode == PreemptionMode::Os;
   setup.missing_processors = missing_processors(workers, processors);
   if (!setup.missing_processors.empty()) setup.warnings.push_back(setup.missing_processors);
+  const bool os = setup.mode.mode == PreemptionMode::Os;
   if (const auto throttling = os ? realtime_throttling() : std::nullopt) {
     setup.warnings.push_back(
         fmt::format("real-time throttling is on: SCHED_FIFO threads get at most {} of every {} us of a busy processor "

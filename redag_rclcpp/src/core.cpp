@@ -50,12 +50,11 @@ ReDAGExecutor::Core::Core(const rclcpp::Context::SharedPtr &context, ReDAGOption
       tasks_(
           redag::Platform{
               .workers = setup_.config.workers, .preemption = setup_.mode.mode, .devices = options_.devices},
-          options_.policy, options_.ties, options_.workload ? &*options_.workload : nullptr),
+          setup_.config.policy, setup_.config.ties, options_.workload ? &*options_.workload : nullptr),
       registry_(context, options_, setup_.config.workers,
                 {.engine = *engine_, .timer = timer_, .bridge = bridge_, .tasks = tasks_}),
       learning_(registry_, options_.learn.count()),
-      deadlock_watch_({.engine = *engine_, .tasks = tasks_, .notes = notes_}, setup_.config.workers,
-                      options_.deadlocks) {
+      deadlock_watch_({.engine = *engine_, .tasks = tasks_, .notes = notes_}, setup_.config.workers) {
   engine_->share_releases(timer_.thread());
   for (std::string &warning : setup_.warnings) notes_.warn(std::move(warning));
   setup_.warnings.clear();

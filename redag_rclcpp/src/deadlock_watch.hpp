@@ -26,15 +26,11 @@ class DeadlockWatch {
     const TaskTable &tasks;
     Notes &notes;
   };
-  /// `workers` of the executor. `enabled`: ReDAGOptions::deadlocks.
-  DeadlockWatch(const Parts &parts, std::uint32_t workers, bool enabled)
-      : parts_(parts), workers_(workers), enabled_(enabled) {}
+  /// `workers` of the executor.
+  DeadlockWatch(const Parts &parts, std::uint32_t workers) : parts_(parts), workers_(workers) {}
 
   /// A request or response has arrived. True: the spinning thread must be woken to look().
-  [[nodiscard]] bool arrived() {
-    if (!enabled_ || wanted_.load(std::memory_order_relaxed)) return false;
-    return !wanted_.exchange(true);
-  }
+  [[nodiscard]] bool arrived() { return !wanted_.load(std::memory_order_relaxed) && !wanted_.exchange(true); }
   /// Looks, if it is time to.
   void look();
   /// When to call look() again; kNever: after arrived().
@@ -47,7 +43,6 @@ class DeadlockWatch {
 
   const Parts parts_;
   const std::uint32_t workers_;
-  const bool enabled_;
   std::atomic<bool> wanted_{false};
   redag::Time next_look_ = redag::kNever;
   DeadlockDetector detector_;

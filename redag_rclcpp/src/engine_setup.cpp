@@ -9,7 +9,6 @@
 
 #include "redag/model/validate.hpp"
 #include "redag/runtime/executor_options.hpp"
-#include "redag/runtime/spins.hpp"
 #include "redag/runtime/threads.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 
@@ -22,7 +21,6 @@ ReDAGOptions prepare(ReDAGOptions options) {
     throw std::invalid_argument(
         "default_period must be greater than 0, because callbacks with shorter periods are more urgent");
   }
-  if (options.spin < nanoseconds(0)) throw std::invalid_argument("spin must not be negative");
   if (options.watchdog < nanoseconds(0)) throw std::invalid_argument("watchdog must not be negative");
   redag::runtime::check_devices("ReDAGOptions::devices", options.devices);
   if (!options.workload) return options;
@@ -34,28 +32,28 @@ ReDAGOptions prepare(ReDAGOptions options) {
 
 redag::runtime::Setup set_up(const ReDAGOptions &options) {
   auto setup = redag::runtime::set_up({.preemption = options.preemption,
-                                       .policy = options.policy,
-                                       .ties = options.ties,
+                                       .policy = options.workload ? options.workload->policy : redag::Workload().policy,
+                                       .ties = options.workload ? options.workload->ties : redag::Workload().ties,
                                        .workers = options.workers,
                                        .threads = options.threads,
-                                       .cpus = options.cpus,
-                                       .share_order = options.share_order});
+                                       .cpus = options.cpus});
   if (!setup) throw std::runtime_error(to_string(setup.error()));
   return *std::move(setup);
 }
 
 std::unique_ptr<redag::runtime::Engine> make_engine(
-    const ReDAGOptions &options, redag::runtime::Setup &setup, redag::Time origin,
+    const ReDAGOptions &options, const redag::runtime::Setup &setup, redag::Time origin,
     std::function<void(const redag::runtime::Job &, std::exception_ptr)> on_exception) {
   redag::runtime::EngineOptions engine_options;
-  engine_options.spins = redag::runtime::spins_before_sleep(setup, options.spin.count());
   if (options.lock_memory) engine_options.touched_stack = redag::runtime::kTouchedStack;
   engine_options.config = setup.config;
   engine_options.config.reuse_ids = options.trace_capacity == 0;  // in a trace an id stands for one task
   engine_options.band = setup.band;
   engine_options.order_folder = setup.order_folder;
   engine_options.cpus = options.cpus;
-  engine_options.spare_threads = options.spare_threads;
+  if (setup.mode.mode != redag::PreemptionMode::Os && options.threads > setup.config.workers) {
+    engine_options.spare_threads = options.threads - setup.config.workers;
+  }
   engine_options.trace_capacity = options.trace_capacity;
   engine_options.measure = options.live;
   engine_options.waits_priority = setup.timer_priority();

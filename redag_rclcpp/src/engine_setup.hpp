@@ -21,10 +21,10 @@ namespace redag_rclcpp {
 /// Throws std::runtime_error if the machine does not offer what the options ask for.
 [[nodiscard]] redag::runtime::Setup set_up(const ReDAGOptions &options);
 
-/// `setup` gets a warning if the options cannot be kept. `origin`: zero of the engine's clock, on CLOCK_MONOTONIC.
+/// `origin`: zero of the engine's clock, on CLOCK_MONOTONIC.
 /// `on_exception` is called on workers.
 [[nodiscard]] std::unique_ptr<redag::runtime::Engine> make_engine(
-    const ReDAGOptions &options, redag::runtime::Setup &setup, redag::Time origin,
+    const ReDAGOptions &options, const redag::runtime::Setup &setup, redag::Time origin,
     std::function<void(const redag::runtime::Job &, std::exception_ptr)> on_exception);
 
 }  // namespace redag_rclcpp

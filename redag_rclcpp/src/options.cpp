@@ -31,10 +31,6 @@ constexpr std::size_t kTraceCapacity = std::size_t{1} << 14;  // events per ring
 
 constexpr std::array kModes = {redag::PreemptionMode::Auto, redag::PreemptionMode::None,
                                redag::PreemptionMode::Cooperative, redag::PreemptionMode::Os};
-constexpr std::array kPolicies = {redag::PolicyKind::RateMonotonic, redag::PolicyKind::DeadlineMonotonic,
-                                  redag::PolicyKind::Fixed,         redag::PolicyKind::Edf,
-                                  redag::PolicyKind::Fifo,          redag::PolicyKind::ChainAware};
-constexpr std::array kTies = {redag::Ties::Share, redag::Ties::Fixed};
 
 template <class Values>
 std::string names_of(const Values &values) {
@@ -112,8 +108,6 @@ void read_config(rclcpp::Node &node, ParameterReader &reader, ReDAGOptions &opti
     }
   }
   if (options.preemption == redag::PreemptionMode::Auto) options.preemption = workload.platform.preemption;
-  if (options.policy == redag::PolicyKind::RateMonotonic) options.policy = workload.policy;
-  if (options.ties == redag::Ties::Share) options.ties = workload.ties;
   if (options.devices.empty()) options.devices = workload.platform.devices;
   options.workload = std::move(loaded->workload);
 }
@@ -139,26 +133,12 @@ ReDAGOptions declare_options(rclcpp::Node &node) {
        "Preemption mode; auto: the mode in `config`, or os if the process has real-time rights, or else cooperative",
        names_of(kModes)},
       kModes);
-  options.policy =
-      reader.one_of({"policy", "Priority order of callbacks; rate_monotonic: the policy in `config`, if it states one",
-                     names_of(kPolicies)},
-                    kPolicies);
-  options.ties = reader.one_of({"ties",
-                                "Order of callbacks with equal priority; share: earlier release first, or the value in "
-                                "`config`; fixed: always the same order",
-                                names_of(kTies)},
-                               kTies);
-  const ParameterSpec threads{
-      "threads",
-      "Number of threads with preemption os: callbacks that can be started and unfinished at once; 0: workers + 16",
-      fmt::format("0, or a whole number from the number of workers to {}", kMostThreads)};
+  const ParameterSpec threads{"threads",
+                              "Callbacks that can be started and unfinished at once: threads with preemption os, "
+                              "otherwise workers and callbacks "
+                              "in a redag::Blocking; 0: with os workers + 16, otherwise as many as workers",
+                              fmt::format("0, or a whole number from the number of workers to {}", kMostThreads)};
   options.threads = static_cast<std::uint32_t>(reader.integer(threads, 0, 0, kMostThreads));
-  options.spare_threads = static_cast<std::uint32_t>(
-      reader.integer({"spare_threads",
-                      "Number of threads besides the workers with preemption none and cooperative, for callbacks that "
-                      "block in a redag::Blocking and leave their workers to others",
-                      fmt::format("a whole number from 0 to {}", kMostThreads)},
-                     0, 0, kMostThreads));
   options.cpus = read_cpus(reader);
   read_config(node, reader, options);
   if (options.threads > 0 && options.threads < options.workers) {
@@ -184,28 +164,14 @@ ReDAGOptions declare_options(rclcpp::Node &node) {
                                      "to avoid page faults in callbacks",
                                      "true or false"},
                                     false);
-  options.spin = reader.seconds(
-      {"spin", "Seconds for which an idle worker looks for a callback before it sleeps; not with preemption os",
-       "a number of seconds of at least 0"},
-      0.0, true);
   options.watchdog = reader.seconds(
       {"watchdog",
        "Warn about callbacks that are in progress for longer than these seconds, while they still run; 0: no warnings",
        "a number of seconds of at least 0"},
       0.0, true);
-  options.deadlocks = reader.flag({"deadlocks",
-                                   "Name callbacks that wait for a response which cannot reach them, in the log and on "
-                                   "/diagnostics; costs eight looks a second",
-                                   "true or false"},
-                                  true);
   options.live = reader.flag(
       {"live", "Let `redag top` show the executor; costs a page of memory and two updates a second", "true or false"},
       true);
-  options.share_order = reader.flag({"share_order",
-                                     "With preemption os, share one order of priorities with the other executors of "
-                                     "this user that do so, also in other processes",
-                                     "true or false"},
-                                    false);
   const bool counts_responses = reader.bounds() && options.workload && has_all_wcets(*options.workload);
   if (!reader.trace().empty() || counts_responses) options.trace_capacity = kTraceCapacity;
   return options;

@@ -4,7 +4,6 @@
 #include "parameter_reader.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <cmath>
 
@@ -73,16 +72,6 @@ nanoseconds ParameterReader::seconds(const ParameterSpec &spec, double initial, 
   const bool fits = number == 0 ? may_be_zero : number >= 1e-9 && number <= kMostSeconds;
   if (!fits) refuse(spec.name, value, spec.allowed);
   return nanoseconds(std::llround(number * 1e9));
-}
-
-std::string ParameterReader::word(const char *name, const char *description, const std::vector<std::string> &words) {
-  const ParameterSpec spec{name, description, fmt::format("one of {}", fmt::join(words, ", "))};
-  const ParameterValue value = this->value(spec, ParameterValue(words.front()));
-  if (value.get_type() != ParameterType::PARAMETER_STRING) refuse(name, value, spec.allowed);
-  if (std::find(words.begin(), words.end(), value.get<std::string>()) == words.end()) {
-    refuse(name, value, spec.allowed);
-  }
-  return value.get<std::string>();
 }
 
 std::string ParameterReader::trace() {

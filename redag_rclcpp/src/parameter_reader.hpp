@@ -4,11 +4,9 @@
 // ParameterReader declares and reads the ROS parameters of the executor and of its monitor. For one thread.
 #pragma once
 
-#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <string>
-#include <vector>
 
 #include "rclcpp/node.hpp"
 #include "rclcpp/parameter_value.hpp"
@@ -34,8 +32,6 @@ class ParameterReader {
   bool flag(const ParameterSpec &spec, bool initial);
   std::string text(const ParameterSpec &spec, const std::string &initial, bool read_only = true);
   std::chrono::nanoseconds seconds(const ParameterSpec &spec, double initial, bool may_be_zero);
-  /// The first word is the default.
-  std::string word(const char *name, const char *description, const std::vector<std::string> &words);
   /// The first value is the default.
   template <class Values>
   typename Values::value_type one_of(const ParameterSpec &spec, const Values &values) {

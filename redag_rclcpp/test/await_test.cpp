@@ -156,7 +156,7 @@ class BlockedTest : public AwaitTest {
     client = node->create_client<EmptyService>("/map");  // in the group of the timer
     elsewhere = std::make_unique<rclcpp::executors::SingleThreadedExecutor>();
     elsewhere->add_node(server_node);
-    options.spare_threads = 1;
+    options.threads = options.workers + 16;
   }
   void TearDown() override {
     release = true;

@@ -300,30 +300,7 @@ TEST_P(RealtimeTest, MoreWorkersThanProcessorsAreAnErrorWithOs) {
   }
 }
 
-TEST_P(RealtimeTest, AnIdleWorkerThatLooksForWorkFindsIt) {
-  options.spin = 100us;
-  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
-  const auto warning = Contains(HasSubstr("do not spin"));
-  if (GetParam() == redag::PreemptionMode::Os) {
-    EXPECT_THAT(executor.warnings(), warning);
-  } else {
-    EXPECT_THAT(executor.warnings(), ::testing::Not(warning));
-  }
-  std::atomic<int> calls{0};
-  auto subscription = subscribe("/topic", [&] { ++calls; });
-  executor.add_node(node);
-  const Spinner spinner(executor);
-  const auto topic = publisher("/topic");
-  for (int sent = 1; sent <= 20; ++sent) {
-    topic->publish(Empty());
-    ASSERT_TRUE(eventually([&] { return calls == sent; }));
-  }
-}
-
-TEST_P(RealtimeTest, NegativeTimesAreRefused) {
-  options.spin = -1ns;
-  EXPECT_THROW(ReDAGExecutor(rclcpp::ExecutorOptions(), options), std::invalid_argument);
-  options.spin = 0ns;
+TEST_P(RealtimeTest, ANegativeTimeIsRefused) {
   options.watchdog = -1ns;
   EXPECT_THROW(ReDAGExecutor(rclcpp::ExecutorOptions(), options), std::invalid_argument);
 }

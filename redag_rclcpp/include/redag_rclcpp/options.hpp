@@ -11,11 +11,12 @@
 
 namespace redag_rclcpp {
 
-/// Declares (unless declared already) and reads these parameters: workers, preemption, policy, ties, threads,
-/// spare_threads, cpu_affinity, config, default_period, learn, raise_middleware, lock_memory, spin, watchdog,
-/// deadlocks, live, share_order, trace, bounds. They are read-only from then on.
+/// Declares (unless declared already) and reads these parameters: workers, preemption, threads, cpu_affinity,
+/// config, default_period, learn, raise_middleware, lock_memory, watchdog, live, trace, bounds. They are read-only from
+/// then on.
 ///
-/// `config` names a workload file. The file's platform and policy count where the parameter has its default. Throws
+/// `config` names a workload file. The file's policy decides the order. Its platform counts where the parameter
+/// has its default. Throws
 /// rclcpp::exceptions::InvalidParameterValueException, whose text names the parameter, its value, and the allowed
 /// values. Mistakes in the workload are listed all at once, each as file:line.
 [[nodiscard]] ReDAGOptions declare_options(rclcpp::Node &node);

@@ -16,18 +16,6 @@ namespace {
 
 constexpr std::int64_t kMostTraceEvents = 1'000'000'000;
 
-/// Names and values are those of the options of `redag run`.
-void read_forms(ParameterReader &reader, MonitorOptions &options) {
-  options.events_as_text =
-      reader.word("events", "Form of the events of `trace`: events.redag (compressed), or events.jsonl (text)",
-                  {"redag", "jsonl"}) == "jsonl";
-  const std::string picture = reader.word(
-      "picture",
-      "Whether `trace` has trace.pftrace, the schedule as a picture; auto: if there are at most 500 000 events",
-      {"auto", "always", "never"});
-  if (picture != "auto") options.picture = picture == "always";
-}
-
 std::optional<redag::Calibration> read_overheads(ParameterReader &reader) {
   const std::string path = reader.text(
       {"overheads",
@@ -52,15 +40,10 @@ MonitorOptions declare_monitor_options(rclcpp::Node &node, const ReDAGOptions &e
       reader.seconds({"metrics_period", "Seconds between two messages on /diagnostics and ~/metrics; 0: no messages",
                       "a number of seconds of at least 0"},
                      1.0, true);
-  options.metrics_file =
-      reader.text({"metrics_file", "File for the last message of ~/metrics, written when spinning ends; empty: none",
-                   "the path of a file"},
-                  "");
   options.save_path =
       reader.text({"save_path", "File to which the service ~/save writes the learned workload", "the path of a file"},
                   options.save_path, false);
   options.trace = reader.trace();
-  read_forms(reader, options);
   options.trace_events = static_cast<std::size_t>(reader.integer(
       {"trace_events", "Number of events that are kept for `trace`, at 32 bytes each; later events are dropped",
        fmt::format("a whole number from 1 to {}", kMostTraceEvents)},
