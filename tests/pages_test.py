@@ -40,9 +40,10 @@ def first_cells(page, heading):
 
 class Pages(unittest.TestCase):
     def test_ros2_lists_the_parameters(self):
-        sources = [f for f in SOURCE.glob("redag_rclcpp*/**/*.cpp") if f.name == "options.cpp"]
-        self.assertEqual(len(sources), 1, sources)
-        text = sources[0].read_text(encoding="utf-8")
+        sources = [f for f in SOURCE.glob("redag_rclcpp/src/**/*.cpp")
+                   if f.name in ("options.cpp", "parameter_reader.cpp", "monitor_options.cpp")]
+        self.assertEqual(len(sources), 3, sources)
+        text = "".join(file.read_text(encoding="utf-8") for file in sources)
         declared = re.findall(r'(?:\{|word\()\s*"([a-z_]+)",\s*(?!"[a-z]+"[,}])"', text)  # not lists of words
         self.assertGreater(len(declared), 15)
         declared += re.findall(r'\.find\("([a-z_]+)"\)', text)  # declared by rclcpp's container

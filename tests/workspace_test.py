@@ -36,9 +36,8 @@ SYSTEM_KEYS = {
 }
 # Packages of the distributions themselves: ros-<distribution>-<name>.
 ROS_KEYS = {"ament_cmake", "ament_index_python", "composition_interfaces", "diagnostic_msgs", "launch", "launch_ros", "rcl",
-            "pal_statistics_msgs", "rcl_interfaces", "rclcpp", "rclcpp_action", "rclcpp_components", "rclcpp_lifecycle", "rcutils", "rmw",
-            "rosbag2_compression", "rosbag2_compression_zstd", "rosbag2_cpp", "rosbag2_storage",
-            "rosbag2_storage_default_plugins", "rosgraph_msgs", "std_msgs", "std_srvs", "test_msgs", "tracetools"}
+            "rcl_interfaces", "rclcpp", "rclcpp_action", "rclcpp_components", "rclcpp_lifecycle", "rcutils", "rmw",
+            "rosgraph_msgs", "std_msgs", "std_srvs", "test_msgs", "tracetools"}
 # Names that find_package() looks for, with the rosdep key that installs them. The C library has the threads,
 # and packages are built without LTTng.
 CMAKE_PACKAGES = {"fmt": "fmt", "nlohmann_json": "nlohmann-json-dev", "tl-expected": "libexpected-dev",
@@ -54,7 +53,7 @@ OPTIONAL = {"redag_rclcpp": {"cm_executors"},
                                  "controller_interface", "controller_manager", "controller_manager_msgs",
                                  "hardware_interface", "pluginlib", "sensor_msgs",
                                  "geometry_msgs", "nav2_controller", "nav2_msgs", "nav_msgs",
-                                 "rclcpp_action", "rosbag2_transport", "tf2_ros"}}
+                                 "rclcpp_action", "rosbag2_cpp", "rosbag2_storage", "rosbag2_transport", "tf2_ros"}}
 # Folders of the repository that a package uses where they are there, and does without elsewhere.
 BESIDE = ("../benchmarks/counted", "../redag_testing")
 ROS_PACKAGES = ("redag_rclcpp", "redag_rclcpp_lab")

@@ -297,29 +297,14 @@ void Engine::resume() {
   decide(locked, at);
 }
 
-bool Engine::wait_paused(Time deadline) { return wait_for(&Engine::all_paused, deadline); }
-
-std::optional<bool> Engine::all_paused(Locked & /*locked*/) {
-  if (!paused_) return false;
-  return placement_.unfinished() == 0 ? std::optional(true) : std::nullopt;
-}
-
-bool Engine::wait_quiet(Time deadline) { return wait_for(&Engine::all_quiet, deadline); }
-
-std::optional<bool> Engine::all_quiet(Locked &locked) {
-  withdraw_if_halting(locked);
-  if (paused_ || halted_at_ != kNever) return false;
-  return is_quiet() ? std::optional(true) : std::nullopt;
-}
-
-// Repeats a question until it has an answer. After the deadline, no answer is false.
-bool Engine::wait_for(std::optional<bool> (Engine::*question)(Locked &), Time deadline) {
+bool Engine::wait_paused(Time deadline) {
   for (bool in_time = true;;) {
     std::uint32_t seen = 0;
     {
       Locked locked(*this);
-      if (const std::optional<bool> answer = (this->*question)(locked); answer || !in_time)
-        return answer.value_or(false);
+      if (!paused_) return false;
+      if (placement_.unfinished() == 0) return true;
+      if (!in_time) return false;
       ++pause_waiters_;
       seen = pause_changes_.load(std::memory_order_relaxed);
     }

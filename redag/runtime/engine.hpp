@@ -6,7 +6,7 @@
 // (release timer, rclcpp) and provide the bodies.
 //
 // Threads: any thread, also a body, may call any member but start(), join(), run_one(), drain(), end_started(),
-// wait_idle(), wait_quiet() and wait_paused(). drain() is for one thread at a time. halt() is async-signal-safe. No
+// wait_idle() and wait_paused(). drain() is for one thread at a time. halt() is async-signal-safe. No
 // body has a lock.
 #pragma once
 
@@ -210,10 +210,6 @@ class Engine {
   void end_started();
   /// Ends a pause and decides at once.
   void resume();
-  /// Unless paused, waits until nothing that was released can go on: no job has a thread, and none is about to get one.
-  /// Jobs that wait do not count. Returns false after `deadline` (CLOCK_MONOTONIC; kNever: no limit), or if the engine
-  /// is paused or halted. With one worker and no release from outside meanwhile, that is the end of a lot of jobs.
-  [[nodiscard]] bool wait_quiet(Time deadline);
   /// Starts the most urgent eligible job if a worker is free for it, and runs it to its end on the calling thread, at
   /// that thread's priority. A preemption point in the job only checks its budget. Returns false if there is no such
   /// job. Requires pause(), and that no other run_one() is in progress. Not for jobs that wait.
@@ -329,11 +325,6 @@ class Engine {
     if (halting() && halted_at_ == kNever) withdraw(locked);
   }
   void withdraw(Locked &locked) REDAG_REQUIRES(lock_);
-  [[nodiscard]] bool is_quiet() const REDAG_REQUIRES(lock_) { return placement_.unfinished() == waiting_.size(); }
-  // Questions of wait_for(): with no answer yet, it asks again.
-  std::optional<bool> all_paused(Locked &locked) REDAG_REQUIRES(lock_);
-  std::optional<bool> all_quiet(Locked &locked) REDAG_REQUIRES(lock_);
-  bool wait_for(std::optional<bool> (Engine::*question)(Locked &), Time deadline) REDAG_EXCLUDES(lock_);
   void wake_pause_waiters() REDAG_REQUIRES(lock_);
   void end_of_jobs() REDAG_REQUIRES(lock_);
   /// Returns true if a thread may begin its next job without carry_out(): preemption points need not know of it.
@@ -359,7 +350,7 @@ class Engine {
   bool running_ REDAG_GUARDED_BY(lock_) = false;  // the threads have been started
   bool paused_ REDAG_GUARDED_BY(lock_);
   std::uint32_t pause_waiters_ REDAG_GUARDED_BY(lock_) = 0;
-  FutexWord pause_changes_{0};  // counts what wait_paused() and wait_quiet() wait for; written under the lock
+  FutexWord pause_changes_{0};  // counts what wait_paused() waits for; written under the lock
   Time halted_at_ REDAG_GUARDED_BY(lock_) = kNever;
   std::optional<Time> settled_ REDAG_GUARDED_BY(lock_);
   trace::Ring decisions_;  // written under the lock

@@ -162,7 +162,7 @@ inline Outcome Engine::call(const Assignment &assignment, RunningJob &running) {
       taker.next.kind = Next::Kind::Nothing;
       placement_.end(self);
       carry_out(locked, step, at, is_caller ? nullptr : &taker);
-      if (is_quiet()) end_of_jobs();
+      if (placement_.unfinished() == 0) end_of_jobs();
     }
   }
   return delayed || !running.on_trust ? now() : at;
@@ -193,9 +193,9 @@ void Engine::note_misses(Locked &locked, const Job &job, const TaskEntry &entry,
   }
 }
 
-// No job is in progress any more, but for those that wait.
+// end_of_jobs() is called when no started job is left.
 void Engine::end_of_jobs() {
-  if (halted_at_ != kNever && placement_.unfinished() == 0) idle_event_.set();
+  if (halted_at_ != kNever) idle_event_.set();
   if (pause_waiters_ > 0) wake_pause_waiters();
 }
 

@@ -78,7 +78,6 @@ std::optional<Time> Engine::suspend(Taker &taker, RunningJob &running) {
     }
     taker.next.kind = Next::Kind::Nothing;
     decide(locked, at, &taker);
-    if (pause_waiters_ > 0 && is_quiet()) wake_pause_waiters();
   }
   return delayed || !running.on_trust ? now() : at;
 }

@@ -118,27 +118,21 @@ Result<Setup> set_up(const SetupRequest &request) {
   const std::uint32_t threads = std::max(request.threads == 0 ? workers + kSpareThreads : request.threads, workers);
   setup.config = make_config(setup.mode, workers, request.policy, setup.band, threads);
   setup.config.ties = request.ties;
+  setup.missing_processors = missing_processors(workers, processors);
+  if (!setup.missing_processors.empty()) setup.warnings.push_back(setup.missing_processors);
   const bool os = setup.mode.mode == PreemptionMode::Os;
-  for (std::string &warning : mode_warnings(workers, processors, os ? realtime_throttling() : std::nullopt)) {
-    setup.warnings.push_back(std::move(warning));
-  }
-  return setup;
-}
-
-std::vector<std::string> mode_warnings(std::uint32_t workers, std::size_t cpus,
-                                       const std::optional<Throttling> &throttling) {
-  std::vector<std::string> warnings;
-  if (workers > cpus) {
-    warnings.push_back(
-        fmt::format("{} workers share {} processor(s), so jobs that run together slow each other down", workers, cpus));
-  }
-  if (throttling) {
-    warnings.push_back(
+  if (const auto throttling = os ? realtime_throttling() : std::nullopt) {
+    setup.warnings.push_back(
         fmt::format("real-time throttling is on: SCHED_FIFO threads get at most {} of every {} us of a busy processor "
                     "(turn it off with 'sysctl kernel.sched_rt_runtime_us=-1')",
                     throttling->runtime_us, throttling->period_us));
   }
-  return warnings;
+  return setup;
+}
+
+std::string missing_processors(std::uint32_t workers, std::size_t cpus) {
+  if (workers <= cpus) return "";
+  return fmt::format("{} workers share {} processor(s), so jobs that run together slow each other down", workers, cpus);
 }
 
 }  // namespace redag::runtime

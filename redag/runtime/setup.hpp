@@ -73,6 +73,7 @@ struct Setup {
   sched::Config config;
   std::string order_folder;  // see EngineOptions
   std::vector<std::string> warnings;
+  std::string missing_processors;  // the warning that there are fewer than workers; "": there are enough
 
   /// SCHED_FIFO priority of threads that must not wait for jobs, first of all the release timer; 0: none. Without `os`
   /// it is one above that of the calling thread, which workers inherit (`chrt -f 10 program`).
@@ -95,8 +96,7 @@ struct SetupRequest {
 /// Returns what this machine can provide. Error: as resolve_mode().
 [[nodiscard]] Result<Setup> set_up(const SetupRequest &request);
 
-/// What a user should know before trusting the figures: too few processors, or real-time throttling.
-[[nodiscard]] std::vector<std::string> mode_warnings(std::uint32_t workers, std::size_t cpus,
-                                                     const std::optional<Throttling> &throttling);
+/// Returns the warning that the workers have to share processors; "": they have one each.
+[[nodiscard]] std::string missing_processors(std::uint32_t workers, std::size_t cpus);
 
 }  // namespace redag::runtime

@@ -273,9 +273,9 @@ TEST(Setup, TheTimerOutranksWorkersThatInheritAPriority) {
   }
 }
 
-TEST(ModeWarnings, TellOfTooFewProcessors) {
-  EXPECT_TRUE(mode_warnings(2, 2, std::nullopt).empty());
-  ASSERT_EQ(mode_warnings(4, 2, std::nullopt).size(), 1U);
+TEST(MissingProcessors, AreThoseThatWorkersShare) {
+  EXPECT_EQ(missing_processors(2, 2), "");
+  EXPECT_NE(missing_processors(4, 2), "");
 }
 
 }  // namespace

@@ -66,7 +66,6 @@ class WaitingJobs {
     return slot.value < by_slot_.size() ? by_slot_[slot.value] : nullptr;
   }
   [[nodiscard]] bool empty() const { return count_ == 0; }
-  [[nodiscard]] std::size_t size() const { return count_; }
   template <class Function>
   void for_each(Function function) const {
     if (empty()) return;

@@ -7,8 +7,6 @@
 #include <cmath>
 #include <utility>
 
-#include "lockstep.hpp"
-
 namespace redag_rclcpp {
 
 using redag::kNever;
@@ -49,11 +47,10 @@ void ArrivalCallback::detach() {
 
 // ---- arrivals ----
 
-void ArrivalCallback::arrived(std::size_t count, Source source, int part, bool seen_only, bool leftover) {
+void ArrivalCallback::arrived(std::size_t count, Source source, int part, bool seen_only) {
   std::shared_ptr<ExecutorContext> to_wake;
   std::shared_ptr<ExecutorContext> to_adopt;
   std::shared_ptr<ExecutorContext> to_tell;
-  std::shared_ptr<ExecutorContext> to_pace;
   Time now = 0;
   Release release;
   bool begins = false;
@@ -66,21 +63,14 @@ void ArrivalCallback::arrived(std::size_t count, Source source, int part, bool s
     // Messages of this process arrive on the publishing thread, within the job that is the task's predecessor.
     const redag::runtime::RunningJob *publisher = engine().current_job();
     if (learn_from_arrival(now, count, source, publisher)) to_adopt = context();
-    const bool from_outside = is_from_outside(publisher, leftover);
-    const bool held = from_outside && paced_;
-    if (held) {
-      paced_arrivals_ += count;
-      to_pace = context();
-    }
-    const Time turn = lockstep() == nullptr ? now : lockstep()->turn();
-    const Time origin = origin_of(turn, publisher);
+    const Time origin = origin_of(now, publisher);
     const bool direct = context()->direct();
     if (depth_ > 0) count = std::min(count, depth_);
     bool replaces = false;
     for (std::size_t i = 0; i < count; ++i) {
       if (depth_ > 0 && kept_[index_of(source)] >= depth_) {
         const Overwritten whose = drop_oldest(source);
-        if (whose == Overwritten::Released && direct && !replaces && !held && releases_.none()) {
+        if (whose == Overwritten::Released && direct && !replaces && releases_.none()) {
           // The released job's message is gone. Its release is replaced by one for the next message. A release that is
           // still in progress could come after the one that replaces it, and stands for the next message instead.
           replaces = true;
@@ -89,13 +79,11 @@ void ArrivalCallback::arrived(std::size_t count, Source source, int part, bool s
         }
         if (whose == Overwritten::Started) continue;
       }
-      tokens_.push(Token{.arrival = turn,
+      tokens_.push(Token{.arrival = now,
                          .origin = origin,
                          .source = source,
                          .part = part,
                          .seen_only = seen_only,
-                         .held = held,
-                         .from_outside = from_outside && !held,
                          .sender = publisher == nullptr ? redag::JobSlot() : publisher->slot});
       ++kept_[index_of(source)];
     }
@@ -116,14 +104,6 @@ void ArrivalCallback::arrived(std::size_t count, Source source, int part, bool s
   if (to_wake) to_wake->wake();
   if (to_adopt) to_adopt->rate_seen();
   if (to_tell) to_tell->exchange_arrived();
-  if (to_pace) to_pace->lockstep()->arrived();
-}
-
-// In lockstep: true unless a job of this executor has sent it. What a job publishes within the process arrives on the
-// job's thread.
-bool ArrivalCallback::is_from_outside(const redag::runtime::RunningJob *publisher, bool leftover) const {
-  if (lockstep() == nullptr || publisher != nullptr || leftover) return false;
-  return !is_ros_internal(id()) && (takes_part_ || id().kind == redag::Callback::Kind::Subscription);
 }
 
 // Removes the token of the oldest message, which the middleware has overwritten. Returns what became of its job.
@@ -148,7 +128,7 @@ ArrivalCallback::Overwritten ArrivalCallback::drop_oldest(Source source) {
 // left lock_. Without a job of the task that is in progress, only releases_ keeps the engine, and the task's id its
 // own.
 bool ArrivalCallback::begin_release(Release &release) {
-  if (released_ > 0 || !context() || !has_token()) return false;
+  if (released_ > 0 || !context() || tokens_.empty()) return false;
   if (!context()->direct()) {
     if (!noted_) {
       noted_ = true;
@@ -184,7 +164,7 @@ void ArrivalCallback::admit() {
   {
     const redag::LockGuard guard(lock_);
     noted_ = false;
-    if (!context() || released_ > 0 || !has_token()) return;
+    if (!context() || released_ > 0 || tokens_.empty()) return;
     begin_release_of_first(release);
   }
   engine().release(release, engine().now());
@@ -227,7 +207,7 @@ bool ArrivalCallback::take_token(Token &token) {
   {
     const redag::LockGuard guard(lock_);
     if (released_ > 0) --released_;
-    if (!has_token()) return false;
+    if (tokens_.empty()) return false;
     token = tokens_.pop();
     const std::size_t at = index_of(token.source);
     dropping_[at] += std::exchange(dropped_[at], 0);
@@ -243,10 +223,10 @@ bool ArrivalCallback::take_token(Token &token) {
 
 // Among equal rates the oldest data goes first: a chain of callbacks that began earlier ends earlier. Data that came to
 // this callback before, or is older than the callback's deadline, counts as new. Otherwise callbacks that publish to
-// each other in a circle would go first for ever. In lockstep, ages on the wall's clock play no part.
+// each other in a circle would go first for ever.
 Time ArrivalCallback::origin_of(Time now, const redag::runtime::RunningJob *publisher) {
   Time origin = now;
-  const bool is_young = publisher != nullptr && (lockstep() != nullptr || now - publisher->origin <= deadline());
+  const bool is_young = publisher != nullptr && now - publisher->origin <= deadline();
   if (is_young && publisher->origin != last_origin_) {
     origin = publisher->origin;
   }
@@ -336,48 +316,7 @@ void ArrivalCallback::release_leftovers(Source source) {
     leftovers_[index_of(source)] = true;
     if (kept_[index_of(source)] > 0) return;
   }
-  arrived(1, source, 0, false, true);
-}
-
-// ---- lockstep ----
-
-void ArrivalCallback::pace(bool paced, std::uint64_t arrived) {
-  {
-    const redag::LockGuard guard(lock_);
-    paced_ = paced;
-    paced_arrivals_ = arrived;
-    if (paced || !context()) return;
-  }
-  begin_instant(lockstep()->turn());  // without a player, nothing waits
-}
-
-std::optional<Callback::Paced> ArrivalCallback::paced() const {
-  Paced paced;
-  {
-    const redag::LockGuard guard(lock_);
-    if (!paced_) return std::nullopt;
-    paced.arrived = paced_arrivals_;
-  }
-  paced.countable = !by_wait_set_;
-  describe(paced);
-  return paced;
-}
-
-void ArrivalCallback::begin_instant(Time turn) {
-  Release release;
-  {
-    const redag::LockGuard guard(lock_);
-    for (std::size_t i = 0; i < tokens_.size(); ++i) {
-      Token &token = tokens_.at(i);
-      if (!token.held) continue;
-      token.held = false;
-      token.arrival = turn;
-      token.origin = turn;
-    }
-    if (!begin_release(release)) return;
-  }
-  engine().release(release, engine().now());
-  end_release();
+  arrived(1, source, 0);
 }
 
 // ---- jobs ----
@@ -423,8 +362,6 @@ bool ArrivalCallback::execute_token(const Token &token) {
   Taking taking(*this, token.source);
   if (token.after_skipped) drop_skipped(token.source);
   const bool taken = handle(token, taking);
-  // There are arrivals without a message, for instance when a publisher goes.
-  if (taken && token.from_outside) lockstep()->came_from_outside(*this);
   bool more = false;
   // This job has lowered kept_ and now reads leftovers_. release_leftovers() sets leftovers_ and then reads kept_. At
   // least one of them sees what the other wrote.
@@ -434,7 +371,7 @@ bool ArrivalCallback::execute_token(const Token &token) {
     leftovers = leftovers && taken;
     more = leftovers && kept_[index_of(token.source)] == 0;
   }
-  if (more) arrived(1, token.source, 0, false, true);
+  if (more) arrived(1, token.source, 0);
   return taken;
 }
 
@@ -449,7 +386,7 @@ bool ArrivalCallback::handle_next() {
   Token token;
   {
     const redag::LockGuard guard(lock_);
-    if (!has_token()) return false;
+    if (tokens_.empty()) return false;
     token = tokens_.pop();
   }
   (void)execute_token(token);

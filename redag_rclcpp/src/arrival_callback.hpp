@@ -33,9 +33,6 @@ class ArrivalCallback : public Callback, public Hooked {
   [[nodiscard]] bool has_learned() const override;
   [[nodiscard]] std::vector<KeptInput> kept() const override;
   [[nodiscard]] std::shared_ptr<void> hold() override { return entity(); }
-  void pace(bool paced, std::uint64_t arrived) override;
-  [[nodiscard]] std::optional<Paced> paced() const override;
-  void begin_instant(Time turn) override;
 
   void arrived_in_middleware(std::size_t count) noexcept override { arrived(count, Source::Middleware, 0); }
   Time expire(Time now, std::vector<redag::runtime::Release> &releases,
@@ -56,8 +53,6 @@ class ArrivalCallback : public Callback, public Hooked {
     int part = 0;                // number of the waitable's part
     bool seen_only = false;      // the wait set saw it, no hook
     bool after_skipped = false;  // set by take_token(): drop messages of skipped jobs first
-    bool held = false;           // in lockstep: waits for begin_instant()
-    bool from_outside = false;   // in lockstep: see Lockstep::came_from_outside()
     redag::JobSlot sender;       // the job on whose thread it arrived, if any
   };
 
@@ -89,8 +84,7 @@ class ArrivalCallback : public Callback, public Hooked {
   [[nodiscard]] std::shared_ptr<ArrivalCallback> self() {
     return std::static_pointer_cast<ArrivalCallback>(shared_from_this());
   }
-  /// `leftover`: it was found, and may have arrived before the hook was set.
-  void arrived(std::size_t count, Source source, int part, bool seen_only = false, bool leftover = false);
+  void arrived(std::size_t count, Source source, int part, bool seen_only = false);
   /// Between these two calls no jobs are released: a job of another callback, which holds this one's group, calls
   /// handle_next(). For callbacks that drop no messages.
   void hold_releases() REDAG_EXCLUDES(lock_);
@@ -121,8 +115,6 @@ class ArrivalCallback : public Callback, public Hooked {
   virtual void unhook() = 0;
   /// True if the user has set the middleware's hook. A wait set then watches the entity in its place.
   [[nodiscard]] virtual bool is_hooked_by_user() const = 0;
-  /// Fills what only the entity knows.
-  virtual void describe(Paced &) const {}
   /// The entity; null once it is gone.
   [[nodiscard]] virtual std::shared_ptr<void> entity() const = 0;
   /// Takes what arrived and calls the user's function. False: there was nothing.
@@ -150,9 +142,6 @@ class ArrivalCallback : public Callback, public Hooked {
   [[nodiscard]] bool learn_from_arrival(Time now, std::size_t count, Source source,
                                         const redag::runtime::RunningJob *publisher) REDAG_REQUIRES(lock_);
   [[nodiscard]] bool take_token(Token &token);
-  /// False: there is none, or it waits for an instant.
-  [[nodiscard]] bool has_token() const REDAG_REQUIRES(lock_) { return !tokens_.empty() && !tokens_.front().held; }
-  [[nodiscard]] bool is_from_outside(const redag::runtime::RunningJob *publisher, bool leftover) const;
   [[nodiscard]] bool begin_release(redag::runtime::Release &release) REDAG_REQUIRES(lock_);
   void begin_release_of_first(redag::runtime::Release &release) REDAG_REQUIRES(lock_);
   void end_release() REDAG_EXCLUDES(lock_);
@@ -160,8 +149,6 @@ class ArrivalCallback : public Callback, public Hooked {
   void forget_dropped(Source source) REDAG_EXCLUDES(lock_);
 
   bool takes_part_ = false;  // see take_part_in_exchange()
-  bool paced_ REDAG_GUARDED_BY(lock_) = false;
-  std::uint64_t paced_arrivals_ REDAG_GUARDED_BY(lock_) = 0;
   const std::size_t depth_;
   std::atomic<bool> by_wait_set_;  // a wait set watches the entity
 

@@ -6,7 +6,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "lockstep.hpp"
 #include "redag/runtime/running_job.hpp"
 #include "redag/runtime/waiting_jobs.hpp"
 
@@ -18,7 +17,6 @@ Outcome Callback::execute(const redag::runtime::Job &job) {
   redag::runtime::RunningJob &running = *redag::runtime::RunningJob::current();
   running.owner = this;
   if (!run()) return Outcome::NoData;
-  if (lockstep_ != nullptr) lockstep_->ran(*this);
   if (running.waiting == nullptr) count_job(running, job.release);
   return Outcome::Finished;
 }

@@ -12,7 +12,6 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -82,22 +81,6 @@ class Callback : public TimerQueue::Timer,
   [[nodiscard]] virtual Exchange exchange() const { return {}; }
   [[nodiscard]] virtual std::vector<KeptInput> kept() const { return {}; }
 
-  // ---- in lockstep ----
-
-  /// Messages of a player wait for begin_instant() from now on, or no longer. `arrived`: how many count as arrived.
-  virtual void pace(bool paced, std::uint64_t arrived) { (void)paced, (void)arrived; }
-  /// How a callback whose messages a player publishes stands.
-  struct Paced {
-    std::uint64_t arrived = 0;   // messages of the player
-    std::size_t publishers = 0;  // that the subscription is connected to
-    bool countable = true;       // false: a hook of the user's keeps the executor from counting
-    bool best_effort = false;    // messages can be lost
-  };
-  /// Empty unless paced.
-  [[nodiscard]] virtual std::optional<Paced> paced() const { return std::nullopt; }
-  /// Releases what has waited for this instant: messages of the player, or a timer that is due.
-  virtual void begin_instant(Time turn) = 0;
-
   [[nodiscard]] const redag::CallbackId &id() const { return id_; }
   [[nodiscard]] TaskId task() const { return task_; }
 
@@ -111,15 +94,12 @@ class Callback : public TimerQueue::Timer,
 
  protected:
   Callback(std::shared_ptr<ExecutorContext> context, redag::CallbackId id)
-      : id_(std::move(id)), engine_(context->engine()), lockstep_(context->lockstep()), context_(std::move(context)) {}
+      : id_(std::move(id)), engine_(context->engine()), context_(std::move(context)) {}
 
   /// Leaves the executor, as part of detach(). The caller destroys the result without a lock.
   [[nodiscard]] std::shared_ptr<ExecutorContext> leave() REDAG_REQUIRES(lock_);
   void count_late() { late_.fetch_add(1, std::memory_order_relaxed); }
   [[nodiscard]] redag::runtime::Engine &engine() const { return engine_; }
-  /// Null unless callbacks run in lockstep. As the engine, it can be used by jobs, and by others under lock_ while
-  /// there is a context.
-  [[nodiscard]] Lockstep *lockstep() const { return lockstep_; }
   [[nodiscard]] Duration deadline() const { return deadline_.load(std::memory_order_relaxed); }
 
   mutable redag::PiMutex lock_;
@@ -137,7 +117,6 @@ class Callback : public TimerQueue::Timer,
 
   const redag::CallbackId id_;
   redag::runtime::Engine &engine_;
-  Lockstep *const lockstep_;
   TaskId task_;
   bool in_wait_set_ = false;
   std::shared_ptr<ExecutorContext> context_ REDAG_GUARDED_BY(lock_);

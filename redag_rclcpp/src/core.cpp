@@ -8,83 +8,27 @@
 
 #include <algorithm>
 #include <optional>
-#include <set>
 #include <stdexcept>
 #include <utility>
 
-#include "middleware_report.hpp"
-#include "middleware_threads.hpp"
-#include "rcl/context.h"
+#include "engine_setup.hpp"
 #include "rclcpp/logging.hpp"
-#include "redag/model/validate.hpp"
 #include "redag/runtime/clock.hpp"
-#include "redag/runtime/executor_options.hpp"
 #include "redag/runtime/live_sample.hpp"
-#include "redag/runtime/spins.hpp"
 #include "redag/runtime/threads.hpp"
-#include "redag/sched/priority_scheduler.hpp"
 
 namespace redag_rclcpp {
 
 using redag::kNever;
 using redag::saturated_add;
-using redag::Workload;
 using redag::runtime::monotonic_now;
 using std::chrono::nanoseconds;
 
 namespace {
 
 constexpr redag::Duration kNodesAppear = 3 * redag::kSecond;  // after the first start: until names should match
-constexpr redag::Duration kThreadsAppear = redag::kSecond;    // after a start or new entities: of the middleware
 
 rclcpp::Logger logger() { return rclcpp::get_logger("redag_rclcpp"); }
-
-/// One callback at a time, and nothing that depends on how long callbacks take.
-void run_in_lockstep(ReDAGOptions &options) {
-  options.workers = 1;
-  options.preemption = redag::PreemptionMode::None;
-  options.threads = 0;
-  options.spare_threads = 0;
-  options.learn = nanoseconds(0);
-  options.share_order = false;
-  if (!options.workload) return;
-  for (redag::Dag &dag : options.workload->dags) {
-    for (redag::Task &task : dag.tasks) {
-      task.budget = 0;
-      task.wcet_low = 0;
-    }
-  }
-}
-
-/// Checks and completes the workload. Throws std::runtime_error if the workload is invalid, std::invalid_argument for
-/// other options.
-ReDAGOptions prepare(ReDAGOptions options) {
-  if (options.default_period <= nanoseconds(0)) {
-    throw std::invalid_argument(
-        "default_period must be greater than 0, because callbacks with shorter periods are more urgent");
-  }
-  if (options.spin < nanoseconds(0)) throw std::invalid_argument("spin must not be negative");
-  if (options.watchdog < nanoseconds(0)) throw std::invalid_argument("watchdog must not be negative");
-  redag::runtime::check_devices("ReDAGOptions::devices", options.devices);
-  if (options.lockstep) run_in_lockstep(options);
-  if (!options.workload) return options;
-  const auto findings = redag::validate(*options.workload, redag::ValidateOptions{.wcet_optional = true});
-  if (has_errors(findings)) throw std::runtime_error(to_string(findings));
-  for (redag::Dag &dag : options.workload->dags) redag::inherit_periods(dag);
-  return options;
-}
-
-redag::runtime::Setup set_up(const ReDAGOptions &options) {
-  auto setup = redag::runtime::set_up({.preemption = options.preemption,
-                                       .policy = options.policy,
-                                       .ties = options.ties,
-                                       .workers = options.workers,
-                                       .threads = options.threads,
-                                       .cpus = options.cpus,
-                                       .share_order = options.share_order});
-  if (!setup) throw std::runtime_error(to_string(setup.error()));
-  return *std::move(setup);
-}
 
 /// True if libredag_pi.so is in the process and switched on.
 bool locks_inherit() {
@@ -99,51 +43,22 @@ ReDAGExecutor::Core::Core(const rclcpp::Context::SharedPtr &context, ReDAGOption
       options_(prepare(std::move(options))),
       setup_(set_up(options_)),
       origin_(monotonic_now()),
-      engine_(make_engine()),
+      engine_(make_engine(options_, setup_, origin_,
+                          [this](const redag::runtime::Job &job, std::exception_ptr e) { on_exception(job, e); })),
       timer_(*engine_, origin_),
       bridge_(context),
       tasks_(
           redag::Platform{
               .workers = setup_.config.workers, .preemption = setup_.mode.mode, .devices = options_.devices},
-          options_.policy, options_.ties, options_.workload ? &*options_.workload : nullptr),
+          setup_.config.policy, setup_.config.ties, options_.workload ? &*options_.workload : nullptr),
       registry_(context, options_, setup_.config.workers,
-                {.engine = *engine_, .timer = timer_, .bridge = bridge_, .tasks = tasks_}) {
-  if (options_.lockstep) {
-    lockstep_ = std::make_unique<Lockstep>(
-        context_, origin_,
-        Lockstep::Parts{.engine = *engine_,
-                        .registry = registry_,
-                        .wake = [this] { keeper_parker_.unpark(); },
-                        .name_of = [this](redag::TaskId task) { return tasks_.name_of(task); }});
-  }
+                {.engine = *engine_, .timer = timer_, .bridge = bridge_, .tasks = tasks_}),
+      learning_(registry_, options_.learn.count()),
+      deadlock_watch_({.engine = *engine_, .tasks = tasks_, .notes = notes_}, setup_.config.workers) {
   engine_->share_releases(timer_.thread());
   for (std::string &warning : setup_.warnings) notes_.warn(std::move(warning));
   setup_.warnings.clear();
   if (options_.live) go_live();
-}
-
-std::unique_ptr<redag::runtime::Engine> ReDAGExecutor::Core::make_engine() {
-  redag::runtime::EngineOptions options;
-  options.spins = redag::runtime::spins_before_sleep(setup_, options_.spin.count());
-  if (options_.lock_memory) options.touched_stack = redag::runtime::kTouchedStack;
-  options.config = setup_.config;
-  options.config.reuse_ids = options_.trace_capacity == 0;  // in a trace an id stands for one task
-  options.band = setup_.band;
-  options.order_folder = setup_.order_folder;
-  options.cpus = options_.cpus;
-  options.spare_threads = options_.spare_threads;
-  options.trace_capacity = options_.trace_capacity;
-  options.measure = options_.live;
-  options.waits_priority = setup_.timer_priority();
-  options.start_paused = true;
-  options.on_exception = [this](const redag::runtime::Job &job, std::exception_ptr e) { on_exception(job, e); };
-  options.devices = options_.devices;
-  Workload empty;
-  empty.platform.devices = options_.devices;
-  auto scheduler = std::make_unique<redag::sched::PriorityScheduler>(empty, options.config);
-  auto engine = std::make_unique<redag::runtime::Engine>(std::move(scheduler), std::move(options));
-  engine->set_origin(origin_);
-  return engine;
 }
 
 void ReDAGExecutor::Core::go_live() {
@@ -152,7 +67,8 @@ void ReDAGExecutor::Core::go_live() {
       redag::runtime::live_options(name.empty() ? "ros" : name, "ros", setup_.mode, setup_.config),
       [this](redag::live::Sample &sample) {
         tasks_.sample(*engine_, notes_.live_bounds(), sample);
-        sample.alert = alert();
+        sample.alert = notes_.alert();
+        if (sample.alert.empty()) sample.alert = redag::runtime::alert_of(*engine_);
       });
   if (publisher) {
     live_ = *std::move(publisher);
@@ -203,8 +119,7 @@ void ReDAGExecutor::Core::timers_changed() {
 }
 
 void ReDAGExecutor::Core::exchange_arrived() {
-  if (!options_.deadlocks || looks_for_deadlocks_.load(std::memory_order_relaxed)) return;
-  if (!looks_for_deadlocks_.exchange(true)) keeper_parker_.unpark();
+  if (deadlock_watch_.arrived()) keeper_parker_.unpark();
 }
 
 void ReDAGExecutor::Core::let_wait() {
@@ -229,8 +144,7 @@ void ReDAGExecutor::Core::wait_set_changed() {
 }
 
 void ReDAGExecutor::Core::rate_seen() {
-  if (rate_seen_.exchange(true)) return;
-  keeper_parker_.unpark();
+  if (learning_.rate_seen()) keeper_parker_.unpark();
 }
 
 void ReDAGExecutor::Core::entities_changed() {
@@ -250,9 +164,8 @@ void ReDAGExecutor::Core::admit_noted() {
 
 // For the spin functions that pull: makes ready jobs of everything that there is to do now.
 void ReDAGExecutor::Core::admit(bool look_around) {
-  begin_learning();
-  adopt_rates();
-  if (learning_ && engine_->now() >= learn_until_) stop_learning();
+  learning_.begin(engine_->now());
+  learning_.look(engine_->now());
   if (registry_.is_stale()) registry_.collect();
   if (look_around && !bridge_.empty()) bridge_.wait(nanoseconds(0));
   (void)timer_.expire();
@@ -262,7 +175,7 @@ void ReDAGExecutor::Core::admit(bool look_around) {
 // ---- spinning ----
 
 void ReDAGExecutor::Core::start() {
-  begin_learning();
+  learning_.begin(engine_->now());
   if (started_) return;
   if (!start_error_.empty()) throw std::runtime_error(start_error_);  // an engine can be started only once
   if (options_.lock_memory) {
@@ -296,25 +209,6 @@ void ReDAGExecutor::Core::report_unmatched() {
   for (const std::string &line : registry_.unmatched()) RCLCPP_WARN(logger(), "%s", line.c_str());
 }
 
-// Logs what was found, if it differs from the last time. Threads can appear late: that there are none is reported only
-// when they are `due`.
-void ReDAGExecutor::Core::report(const RaisedMiddleware &middleware, bool due) {
-  if (middleware.found().threads.empty() && !due) return;
-  const rmw_context_t *const rmw = rcl_context_get_rmw_context(context_->get_rcl_context().get());
-  const MiddlewareReport report =
-      describe(middleware.found(),
-               {.rmw = rmw == nullptr || rmw->implementation_identifier == nullptr ? "the middleware"
-                                                                                   : rmw->implementation_identifier,
-                .wanted = middleware.priority(),
-                .top_job = setup_.top_job_priority(),
-                .timer = setup_.timer_priority()});
-  if (report.summary != middleware_summary_) RCLCPP_INFO(logger(), "%s", report.summary.c_str());
-  middleware_summary_ = report.summary;
-  for (const std::string &warning : report.warnings) {
-    if (notes_.warn(warning)) RCLCPP_WARN(logger(), "%s", warning.c_str());
-  }
-}
-
 void ReDAGExecutor::Core::watch_jobs() {
   const redag::runtime::WatchdogOptions limits{.limits = {.longest = options_.watchdog.count(), .deadlines = 0}};
   watchdog_ =
@@ -328,8 +222,12 @@ void ReDAGExecutor::Core::watch_jobs() {
 }
 
 void ReDAGExecutor::Core::spin() {
-  std::optional<RaisedMiddleware> middleware;
-  if (setup_.timer_priority() > 0) middleware.emplace(options_.raise_middleware ? setup_.timer_priority() : 0);
+  std::optional<MiddlewareWatch> middleware;
+  if (setup_.timer_priority() > 0) {
+    middleware.emplace(
+        MiddlewareWatch::Parts{.context = *context_, .setup = setup_, .notes = notes_, .summary = middleware_summary_},
+        options_.raise_middleware);
+  }
   start();
   registry_.collect();
   direct_ = true;
@@ -350,19 +248,7 @@ void ReDAGExecutor::Core::spin() {
       Core &core;
       std::thread thread;
     } join{*this, *std::move(watcher)};
-    if (middleware) {
-      report(*middleware, false);
-      look_at_middleware_at_ = engine_->now() + kThreadsAppear;
-    }
-    const struct Follow {
-      explicit Follow(Lockstep *its) : lockstep(its) {
-        if (lockstep != nullptr) lockstep->open();
-      }
-      ~Follow() {
-        if (lockstep != nullptr) lockstep->close();
-      }
-      Lockstep *lockstep;
-    } follow(lockstep_.get());
+    if (middleware) middleware->begun(engine_->now());
     keep_house(middleware ? &*middleware : nullptr);
   } catch (...) {
     // One cause is a context that was shut down while entities were collected.
@@ -377,80 +263,23 @@ void ReDAGExecutor::Core::spin() {
 }
 
 // Work of spin() on the calling thread, at that thread's own priority: everything that takes long and is not urgent.
-void ReDAGExecutor::Core::keep_house(RaisedMiddleware *middleware) {
+void ReDAGExecutor::Core::keep_house(MiddlewareWatch *middleware) {
   while (hooks_.may_spin() && !wait_set_done_) {
-    const bool is_stale = registry_.is_stale() && !(lockstep_ && lockstep_->in_instant());
+    const bool is_stale = registry_.is_stale();
     if (is_stale) registry_.collect();
-    if (lockstep_) lockstep_->look();
     const redag::Time now = engine_->now();
-    if (middleware != nullptr && now >= look_at_middleware_at_) {
-      look_at_middleware_at_ = kNever;
-      middleware->look();
-      report(*middleware, true);
-    }
-    // Entities can make the middleware create threads.
-    if (middleware != nullptr && is_stale && look_at_middleware_at_ == kNever) {
-      look_at_middleware_at_ = now + kThreadsAppear;
-    }
-    adopt_rates();
-    if (learning_ && now >= learn_until_) stop_learning();
+    if (middleware != nullptr) middleware->look(now, is_stale);
+    learning_.look(now);
     if (now >= report_unmatched_at_) report_unmatched();
-    if (looks_for_deadlocks_ && look_for_deadlocks_at_ == kNever) {
-      look_for_deadlocks_at_ = now + DeadlockDetector::kInterval;
-    }
-    if (now >= look_for_deadlocks_at_) look_for_deadlocks();
-    const redag::Time next = std::min({report_unmatched_at_, look_at_middleware_at_, look_for_deadlocks_at_,
-                                       learning_ ? learn_until_ : kNever, lockstep_ ? lockstep_->next_look() : kNever});
-    if (lockstep_ && lockstep_->in_instant()) {
-      lockstep_->wait(next);
-    } else if (next == kNever) {
+    deadlock_watch_.look();
+    const redag::Time next = std::min({report_unmatched_at_, deadlock_watch_.next_look(), learning_.next_look(),
+                                       middleware == nullptr ? kNever : middleware->next_look()});
+    if (next == kNever) {
       keeper_parker_.park();
     } else if (next > now) {
       keeper_parker_.park_until(origin_ + next);
     }
   }
-}
-
-void ReDAGExecutor::Core::look_for_deadlocks() {
-  class View final : public DeadlockView {
-   public:
-    View(const TaskTable &tasks, std::uint32_t workers, const std::vector<Endpoint> &endpoints)
-        : tasks_(tasks), workers_(workers), endpoints_(endpoints) {}
-    [[nodiscard]] std::uint32_t workers() const override { return workers_; }
-    [[nodiscard]] CallbackPlace place_of(redag::TaskId task) const override { return tasks_.place_of(task); }
-    [[nodiscard]] std::vector<Endpoint> endpoints() const override { return endpoints_; }
-    [[nodiscard]] ThreadWait wait_of(int thread_id) const override { return wait_of_thread(thread_id); }
-
-   private:
-    const TaskTable &tasks_;
-    const std::uint32_t workers_;
-    const std::vector<Endpoint> &endpoints_;
-  };
-  looks_for_deadlocks_ = false;  // what arrives from here on sets it again
-  engine_->started(started_jobs_);
-  const std::vector<Endpoint> endpoints = tasks_.endpoints();
-  const redag::Time now = engine_->now();
-  std::vector<Deadlock> begun;
-  std::vector<Deadlock> ended;
-  deadlock_detector_.look(now, started_jobs_, View(tasks_, setup_.config.workers, endpoints), begun, ended);
-  for (const Deadlock &deadlock : begun) {
-    notes_.add(deadlock);
-    if (deadlock.certain) {
-      RCLCPP_ERROR(logger(), "deadlock: %s", deadlock.text.c_str());
-    } else {
-      RCLCPP_WARN(logger(), "possible deadlock: %s", deadlock.text.c_str());
-    }
-  }
-  for (const Deadlock &deadlock : ended) {
-    notes_.add(deadlock);
-    RCLCPP_INFO(logger(), "the deadlock of %s has ended after %s", deadlock.waiting.c_str(),
-                redag::humanize_duration(deadlock.ended - deadlock.begun).c_str());
-  }
-  const bool goes_on =
-      deadlock_detector_.has_reported() ||
-      std::any_of(endpoints.begin(), endpoints.end(), [](const Endpoint &e) { return !e.kept.empty(); });
-  if (goes_on) looks_for_deadlocks_ = true;
-  look_for_deadlocks_at_ = goes_on ? now + DeadlockDetector::kInterval : kNever;
 }
 
 // Runs on the thread redag-wait, with os above all jobs. While jobs use all processors, cancel() thus still takes
@@ -476,7 +305,7 @@ void ReDAGExecutor::Core::stop_workers() {
   engine_->pause();
   engine_->end_started();
   direct_ = false;
-  if (look_for_deadlocks_at_ != kNever) look_for_deadlocks();  // those of the jobs that have ended are over
+  deadlock_watch_.jobs_ended();
 }
 
 void ReDAGExecutor::Core::spin_ready(nanoseconds max_duration, bool exhaustive) {
@@ -505,7 +334,7 @@ void ReDAGExecutor::Core::spin_one(nanoseconds timeout) {
       const redag::LockGuard guard(noted_lock_);
       idle = idle && noted_.empty();
     }
-    const redag::Time next = std::min({end, timer_.queue().next(), learning_ ? learn_until_ : kNever});
+    const redag::Time next = std::min({end, timer_.queue().next(), learning_.next_look()});
     if (idle) bridge_.wait(next == kNever ? nanoseconds(-1) : nanoseconds(std::max<redag::Duration>(0, next - now)));
     waiting_ = false;
     admit(false);
@@ -526,25 +355,6 @@ void ReDAGExecutor::Core::on_exception(const redag::runtime::Job &job, std::exce
   hooks_.stop();
 }
 
-// ---- learning ----
-
-void ReDAGExecutor::Core::begin_learning() {
-  if (options_.learn.count() <= 0 || learn_until_ != kNever) return;
-  learn_until_ = saturated_add(engine_->now(), options_.learn.count());
-  learns_ = true;
-  learning_ = true;
-}
-
-void ReDAGExecutor::Core::stop_learning() {
-  learning_ = false;
-  RCLCPP_INFO(logger(), "learned the rates of %zu callbacks", registry_.adopt_rates());
-  learned_ = true;
-}
-
-void ReDAGExecutor::Core::adopt_rates() {
-  if (rate_seen_.exchange(false)) static_cast<void>(registry_.adopt_rates());
-}
-
 // ---- queries ----
 
 std::vector<std::string> ReDAGExecutor::Core::warnings() const {
@@ -554,17 +364,14 @@ std::vector<std::string> ReDAGExecutor::Core::warnings() const {
   return all;
 }
 
-// The deadlocks that last, in one line.
-std::string ReDAGExecutor::Core::alert() const {
-  std::vector<Deadlock> lasting = notes_.deadlocks();
-  std::erase_if(lasting, [](const Deadlock &deadlock) { return deadlock.ended != kNever; });
-  if (lasting.empty()) return redag::runtime::alert_of(*engine_);
-  const Deadlock &first = lasting.front();
-  std::string text =
-      fmt::format("{}: {} waits for {}, which cannot get {}", first.certain ? "deadlock" : "possible deadlock",
-                  first.waiting, first.blocked, first.resource);
-  if (lasting.size() > 1) text = fmt::format("{} deadlocks; {}", lasting.size(), text);
-  return text;
+std::vector<std::string> ReDAGExecutor::Core::errors() const {
+  std::vector<std::string> errors;
+  if (setup_.mode.mode != redag::PreemptionMode::Os) return errors;
+  if (!setup_.missing_processors.empty()) errors.push_back(setup_.missing_processors);
+  for (redag::runtime::Problem &problem : engine_->problems()) {
+    if (problem.breaks_order) errors.push_back(std::move(problem.text));
+  }
+  return errors;
 }
 
 redag::trace::RunInfo ReDAGExecutor::Core::run_info(std::vector<std::uint32_t> &positions) const {

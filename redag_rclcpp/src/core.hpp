@@ -19,9 +19,9 @@
 
 #include "bridge.hpp"
 #include "callback.hpp"
-#include "deadlock_detector.hpp"
-#include "lockstep.hpp"
-#include "middleware_threads.hpp"
+#include "deadlock_watch.hpp"
+#include "learning.hpp"
+#include "middleware_watch.hpp"
 #include "notes.hpp"
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/pi_mutex.hpp"
@@ -69,8 +69,9 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
   [[nodiscard]] const redag::runtime::Setup &setup() const { return setup_; }
   [[nodiscard]] const TaskTable &tasks() const { return tasks_; }
   [[nodiscard]] std::vector<std::string> warnings() const;
+  [[nodiscard]] std::vector<std::string> errors() const;
   [[nodiscard]] std::vector<Deadlock> deadlocks() const { return notes_.deadlocks(); }
-  [[nodiscard]] bool learning_done() const { return options_.learn.count() <= 0 || learned_; }
+  [[nodiscard]] bool learning_done() const { return learning_.done(); }
   void set_live_bounds(std::map<std::string, redag::Duration> bounds) { notes_.set_live_bounds(std::move(bounds)); }
   [[nodiscard]] redag::trace::RunInfo run_info(std::vector<std::uint32_t> &positions) const;
 
@@ -84,34 +85,26 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
   void wait_set_changed() override;
   void exchange_arrived() override;
   void entities_changed() override;
-  [[nodiscard]] redag::Duration learning_time() const override { return learns_ ? options_.learn.count() : 0; }
+  [[nodiscard]] redag::Duration learning_time() const override { return learning_.time(); }
   void rate_seen() override;
   void let_wait() override;
   [[nodiscard]] std::shared_ptr<Callback> find_in_group(redag::TaskId member, const void *entity) const override {
     return tasks_.find_in_group(member, entity);
   }
-  [[nodiscard]] Lockstep *lockstep() const override { return lockstep_.get(); }
   [[nodiscard]] redag::runtime::DeviceHandle device(const std::string &name) const override;
 
  private:
-  [[nodiscard]] std::unique_ptr<redag::runtime::Engine> make_engine();
   void go_live();
   void start();
-  void report(const RaisedMiddleware &middleware, bool due);
   void watch_jobs();
   void report_unmatched();
-  void keep_house(RaisedMiddleware *middleware);
-  void look_for_deadlocks();
-  [[nodiscard]] std::string alert() const;
+  void keep_house(MiddlewareWatch *middleware);
   void watch_wait_set() noexcept;
   void stop_workers();
   void admit(bool look_around);
   void admit_noted();
   bool run_one();
   void on_exception(const redag::runtime::Job &job, std::exception_ptr exception);
-  void begin_learning();
-  void stop_learning();
-  void adopt_rates();
 
   rclcpp::Context::SharedPtr context_;
   const ReDAGOptions options_;
@@ -124,25 +117,15 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
   Bridge bridge_;
   TaskTable tasks_;
   Registry registry_;
-  std::unique_ptr<Lockstep> lockstep_;  // null unless ReDAGOptions::lockstep
+  Learning learning_;
+  DeadlockWatch deadlock_watch_;
 
   enum class FirstSpin : std::uint8_t { Awaited, Cancelled, Begun };
   std::atomic<FirstSpin> first_spin_{FirstSpin::Awaited};
 
   std::atomic<bool> direct_{false};
-  std::atomic<bool> learns_{false};     // since the first spin
-  std::atomic<bool> rate_seen_{false};  // since the last adopt_rates()
-  std::atomic<bool> learning_{false};
-  std::atomic<bool> learned_{false};  // the window is over, and callbacks have their rates
-  redag::Time learn_until_ = redag::kNever;
   redag::Time report_unmatched_at_ = redag::kNever;
-  redag::Time look_at_middleware_at_ = redag::kNever;
   std::string middleware_summary_;  // what the log says last about the middleware's threads
-  // There may be requests or responses that were not taken, or deadlocks that last. Only then does anyone look.
-  std::atomic<bool> looks_for_deadlocks_{false};
-  redag::Time look_for_deadlocks_at_ = redag::kNever;  // kNever: not before looks_for_deadlocks_
-  DeadlockDetector deadlock_detector_;
-  std::vector<redag::runtime::StartedJob> started_jobs_;  // for look_for_deadlocks()
   bool started_ = false;
   std::string start_error_;  // why the engine could not start; stays set
 

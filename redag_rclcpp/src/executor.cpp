@@ -179,6 +179,7 @@ void ReDAGExecutor::cancel() {
 const redag::runtime::Mode &ReDAGExecutor::mode() const { return core_->setup().mode; }
 std::uint32_t ReDAGExecutor::workers() const { return core_->setup().config.workers; }
 std::vector<std::string> ReDAGExecutor::warnings() const { return core_->warnings(); }
+std::vector<std::string> ReDAGExecutor::errors() const { return core_->errors(); }
 std::vector<Deadlock> ReDAGExecutor::deadlocks() const { return core_->deadlocks(); }
 std::vector<CallbackStats> ReDAGExecutor::stats() const { return core_->tasks().stats(core_->engine()); }
 void ReDAGExecutor::set_live_bounds(std::map<std::string, redag::Duration> bounds) {

@@ -14,7 +14,6 @@
 namespace redag_rclcpp {
 
 class Callback;
-class Lockstep;
 
 class ExecutorContext {
  public:
@@ -45,8 +44,6 @@ class ExecutorContext {
   virtual void let_wait() = 0;
   /// The callback of this entity if it is in the same mutually exclusive group as that of `member`; otherwise null.
   [[nodiscard]] virtual std::shared_ptr<Callback> find_in_group(redag::TaskId member, const void *entity) const = 0;
-  /// Null unless callbacks run in lockstep with a player. The same for the context's whole life.
-  [[nodiscard]] virtual Lockstep *lockstep() const = 0;
   /// Throws std::out_of_range if the executor has no device of this name.
   [[nodiscard]] virtual redag::runtime::DeviceHandle device(const std::string &name) const = 0;
 };

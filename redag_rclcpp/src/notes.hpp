@@ -51,6 +51,8 @@ class Notes {
     const redag::LockGuard guard(lock_);
     return deadlocks_;
   }
+  /// The deadlocks that last, in one line; "": none.
+  [[nodiscard]] std::string alert() const;
 
   /// Keeps the first exception until throw_failure().
   void fail(std::exception_ptr exception) {

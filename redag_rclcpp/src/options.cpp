@@ -8,11 +8,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <string>
-#include <string_view>
 #include <vector>
 
+#include "parameter_reader.hpp"
 #include "rclcpp/exceptions.hpp"
 #include "rclcpp/logging.hpp"
 #include "redag/model/clusters.hpp"
@@ -28,105 +27,10 @@ using rclcpp::ParameterValue;
 using std::chrono::nanoseconds;
 
 constexpr std::int64_t kMostThreads = 4096;
-constexpr std::int64_t kMostTraceEvents = 1'000'000'000;
-constexpr double kMostSeconds = 1e6;                          // eleven days: a larger value has the wrong unit
 constexpr std::size_t kTraceCapacity = std::size_t{1} << 14;  // events per ring; the monitor empties them every 50 ms
 
 constexpr std::array kModes = {redag::PreemptionMode::Auto, redag::PreemptionMode::None,
                                redag::PreemptionMode::Cooperative, redag::PreemptionMode::Os};
-constexpr std::array kPolicies = {redag::PolicyKind::RateMonotonic, redag::PolicyKind::DeadlineMonotonic,
-                                  redag::PolicyKind::Fixed,         redag::PolicyKind::Edf,
-                                  redag::PolicyKind::Fifo,          redag::PolicyKind::ChainAware};
-constexpr std::array kTies = {redag::Ties::Share, redag::Ties::Fixed};
-
-[[noreturn]] void refuse(const char *name, const ParameterValue &value, const std::string &allowed) {
-  throw rclcpp::exceptions::InvalidParameterValueException(
-      fmt::format("parameter '{}' is {}, but must be {}", name, rclcpp::to_string(value), allowed));
-}
-
-struct Spec {
-  const char *name;
-  const char *description;
-  std::string allowed;
-};
-
-/// Declares and reads parameters. It checks types and values itself, to give one message for both mistakes.
-class Reader {
- public:
-  explicit Reader(rclcpp::Node &node) : node_(node) {}
-
-  ParameterValue value(const Spec &spec, const ParameterValue &initial, bool read_only = true) {
-    if (!node_.has_parameter(spec.name)) {
-      rcl_interfaces::msg::ParameterDescriptor descriptor;
-      descriptor.description = spec.description;
-      descriptor.additional_constraints = spec.allowed;
-      descriptor.read_only = read_only;
-      descriptor.dynamic_typing = true;  // accepts 5 for 5.0; read functions reject other types
-      node_.declare_parameter(spec.name, initial, descriptor);
-    }
-    return node_.get_parameter(spec.name).get_parameter_value();
-  }
-
-  std::int64_t integer(const Spec &spec, std::int64_t initial, std::int64_t least, std::int64_t most) {
-    const ParameterValue value = this->value(spec, ParameterValue(initial));
-    if (value.get_type() != ParameterType::PARAMETER_INTEGER) refuse(spec.name, value, spec.allowed);
-    const auto number = value.get<std::int64_t>();
-    if (number < least || number > most) refuse(spec.name, value, spec.allowed);
-    return number;
-  }
-
-  bool flag(const Spec &spec, bool initial) {
-    const ParameterValue value = this->value(spec, ParameterValue(initial));
-    if (value.get_type() != ParameterType::PARAMETER_BOOL) refuse(spec.name, value, spec.allowed);
-    return value.get<bool>();
-  }
-
-  std::string text(const Spec &spec, const std::string &initial, bool read_only = true) {
-    const ParameterValue value = this->value(spec, ParameterValue(initial), read_only);
-    if (value.get_type() != ParameterType::PARAMETER_STRING) refuse(spec.name, value, spec.allowed);
-    return value.get<std::string>();
-  }
-
-  nanoseconds seconds(const Spec &spec, double initial, bool may_be_zero) {
-    const ParameterValue value = this->value(spec, ParameterValue(initial));
-    double number = 0;
-    if (value.get_type() == ParameterType::PARAMETER_DOUBLE) {
-      number = value.get<double>();
-    } else if (value.get_type() == ParameterType::PARAMETER_INTEGER) {
-      number = static_cast<double>(value.get<std::int64_t>());
-    } else {
-      refuse(spec.name, value, spec.allowed);
-    }
-    const bool fits = number == 0 ? may_be_zero : number >= 1e-9 && number <= kMostSeconds;
-    if (!fits) refuse(spec.name, value, spec.allowed);
-    return nanoseconds(std::llround(number * 1e9));
-  }
-
-  /// The first word is the default.
-  std::string word(const char *name, const char *description, const std::vector<std::string> &words) {
-    const Spec spec{name, description, fmt::format("one of {}", fmt::join(words, ", "))};
-    const ParameterValue value = this->value(spec, ParameterValue(words.front()));
-    if (value.get_type() != ParameterType::PARAMETER_STRING) refuse(name, value, spec.allowed);
-    if (std::find(words.begin(), words.end(), value.get<std::string>()) == words.end()) {
-      refuse(name, value, spec.allowed);
-    }
-    return value.get<std::string>();
-  }
-
-  template <class Values>
-  typename Values::value_type one_of(const Spec &spec, const Values &values) {
-    const ParameterValue value = this->value(spec, ParameterValue(std::string(to_string(values.front()))));
-    if (value.get_type() == ParameterType::PARAMETER_STRING) {
-      for (const auto candidate : values) {
-        if (value.get<std::string>() == to_string(candidate)) return candidate;
-      }
-    }
-    refuse(spec.name, value, spec.allowed);
-  }
-
- private:
-  rclcpp::Node &node_;
-};
 
 template <class Values>
 std::string names_of(const Values &values) {
@@ -135,8 +39,8 @@ std::string names_of(const Values &values) {
   return text;
 }
 
-std::vector<int> read_cpus(Reader &reader) {
-  const Spec spec{
+std::vector<int> read_cpus(ParameterReader &reader) {
+  const ParameterSpec spec{
       "cpu_affinity",
       "Processors that the workers may use; empty: those of `config`, or all that the process may use (with "
       "preemption os, as many of them as there are workers)",
@@ -173,9 +77,9 @@ std::uint32_t read_thread_num(rclcpp::Node &node, std::uint32_t workers) {
   return static_cast<std::uint32_t>(number);
 }
 
-void read_config(rclcpp::Node &node, Reader &reader, ReDAGOptions &options) {
-  const Spec spec{"config", "Workload file that maps callbacks to the tasks of DAGs; empty: none",
-                  "the path of a workload file (docs/workload_format.md)"};
+void read_config(rclcpp::Node &node, ParameterReader &reader, ReDAGOptions &options) {
+  const ParameterSpec spec{"config", "Workload file that maps callbacks to the tasks of DAGs; empty: none",
+                           "the path of a workload file (docs/workload_format.md)"};
   const std::string path = reader.text(spec, "");
   if (path.empty()) return;
   redag::Result<redag::LoadedWorkload> loaded = redag::load_workload(path, {.wcet_optional = true});
@@ -204,8 +108,6 @@ void read_config(rclcpp::Node &node, Reader &reader, ReDAGOptions &options) {
     }
   }
   if (options.preemption == redag::PreemptionMode::Auto) options.preemption = workload.platform.preemption;
-  if (options.policy == redag::PolicyKind::RateMonotonic) options.policy = workload.policy;
-  if (options.ties == redag::Ties::Share) options.ties = workload.ties;
   if (options.devices.empty()) options.devices = workload.platform.devices;
   options.workload = std::move(loaded->workload);
 }
@@ -215,50 +117,10 @@ bool has_all_wcets(const redag::Workload &workload) {
   return !refs.empty() && std::all_of(refs.begin(), refs.end(), [](const auto &ref) { return ref.task->wcet > 0; });
 }
 
-std::string read_trace(Reader &reader) {
-  return reader.text(
-      {"trace",
-       "Folder for events.redag, jobs.csv, summary.json and trace.pftrace, which are written when spinning ends; "
-       "empty: none",
-       "the path of a folder"},
-      "");
-}
-
-/// Names and values are those of the options of `redag run`.
-void read_picture(Reader &reader, MonitorOptions &options) {
-  const std::string picture = reader.word(
-      "picture",
-      "Whether `trace` has trace.pftrace, the schedule as a picture; auto: if there are at most 500 000 events",
-      {"auto", "always", "never"});
-  if (picture != "auto") options.picture = picture == "always";
-}
-
-std::optional<redag::Calibration> read_overheads(Reader &reader) {
-  const std::string path = reader.text(
-      {"overheads",
-       "File of overheads that `redag calibrate` measured on this machine; they are charged to the bounds; empty: none",
-       "the path of an overheads file (docs/calibration.md)"},
-      "");
-  if (path.empty()) return std::nullopt;
-  redag::Result<redag::Calibration> loaded = redag::load_calibration(path);
-  if (!loaded) {
-    throw rclcpp::exceptions::InvalidParameterValueException(
-        fmt::format("parameter 'overheads' is {}:\n{}", path, to_string(loaded.error())));
-  }
-  return *std::move(loaded);
-}
-
-bool read_bounds(Reader &reader) {
-  return reader.flag(
-      {"bounds", "Compare response times with their bounds; needs the execution times of all tasks in `config`",
-       "true or false"},
-      true);
-}
-
 }  // namespace
 
 ReDAGOptions declare_options(rclcpp::Node &node) {
-  Reader reader(node);
+  ParameterReader reader(node);
   ReDAGOptions options;
   options.workers = static_cast<std::uint32_t>(reader.integer(
       {"workers",
@@ -271,26 +133,12 @@ ReDAGOptions declare_options(rclcpp::Node &node) {
        "Preemption mode; auto: the mode in `config`, or os if the process has real-time rights, or else cooperative",
        names_of(kModes)},
       kModes);
-  options.policy =
-      reader.one_of({"policy", "Priority order of callbacks; rate_monotonic: the policy in `config`, if it states one",
-                     names_of(kPolicies)},
-                    kPolicies);
-  options.ties = reader.one_of({"ties",
-                                "Order of callbacks with equal priority; share: earlier release first, or the value in "
-                                "`config`; fixed: always the same order",
-                                names_of(kTies)},
-                               kTies);
-  const Spec threads{
-      "threads",
-      "Number of threads with preemption os: callbacks that can be started and unfinished at once; 0: workers + 16",
-      fmt::format("0, or a whole number from the number of workers to {}", kMostThreads)};
+  const ParameterSpec threads{"threads",
+                              "Callbacks that can be started and unfinished at once: threads with preemption os, "
+                              "otherwise workers and callbacks "
+                              "in a redag::Blocking; 0: with os workers + 16, otherwise as many as workers",
+                              fmt::format("0, or a whole number from the number of workers to {}", kMostThreads)};
   options.threads = static_cast<std::uint32_t>(reader.integer(threads, 0, 0, kMostThreads));
-  options.spare_threads = static_cast<std::uint32_t>(
-      reader.integer({"spare_threads",
-                      "Number of threads besides the workers with preemption none and cooperative, for callbacks that "
-                      "block in a redag::Blocking and leave their workers to others",
-                      fmt::format("a whole number from 0 to {}", kMostThreads)},
-                     0, 0, kMostThreads));
   options.cpus = read_cpus(reader);
   read_config(node, reader, options);
   if (options.threads > 0 && options.threads < options.workers) {
@@ -316,61 +164,16 @@ ReDAGOptions declare_options(rclcpp::Node &node) {
                                      "to avoid page faults in callbacks",
                                      "true or false"},
                                     false);
-  options.spin = reader.seconds(
-      {"spin", "Seconds for which an idle worker looks for a callback before it sleeps; not with preemption os",
-       "a number of seconds of at least 0"},
-      0.0, true);
   options.watchdog = reader.seconds(
       {"watchdog",
        "Warn about callbacks that are in progress for longer than these seconds, while they still run; 0: no warnings",
        "a number of seconds of at least 0"},
       0.0, true);
-  options.deadlocks = reader.flag({"deadlocks",
-                                   "Name callbacks that wait for a response which cannot reach them, in the log and on "
-                                   "/diagnostics; costs eight looks a second",
-                                   "true or false"},
-                                  true);
   options.live = reader.flag(
       {"live", "Let `redag top` show the executor; costs a page of memory and two updates a second", "true or false"},
       true);
-  options.share_order = reader.flag({"share_order",
-                                     "With preemption os, share one order of priorities with the other executors of "
-                                     "this user that do so, also in other processes",
-                                     "true or false"},
-                                    false);
-  options.lockstep = reader.flag({"lockstep",
-                                  "Run one callback at a time, in the same order in each replay of a recording by "
-                                  "play_lockstep; overrides workers, preemption and learn",
-                                  "true or false"},
-                                 false);
-  const bool counts_responses = read_bounds(reader) && options.workload && has_all_wcets(*options.workload);
-  if (!read_trace(reader).empty() || counts_responses) options.trace_capacity = kTraceCapacity;
-  return options;
-}
-
-MonitorOptions declare_monitor_options(rclcpp::Node &node, const ReDAGOptions &executor) {
-  Reader reader(node);
-  MonitorOptions options;
-  options.period =
-      reader.seconds({"metrics_period", "Seconds between two messages on /diagnostics and ~/metrics; 0: no messages",
-                      "a number of seconds of at least 0"},
-                     1.0, true);
-  options.metrics_file =
-      reader.text({"metrics_file", "File for the last message of ~/metrics, written when spinning ends; empty: none",
-                   "the path of a file"},
-                  "");
-  options.save_path =
-      reader.text({"save_path", "File to which the service ~/save writes the learned workload", "the path of a file"},
-                  options.save_path, false);
-  options.trace = read_trace(reader);
-  read_picture(reader, options);
-  options.trace_events = static_cast<std::size_t>(reader.integer(
-      {"trace_events", "Number of events that are kept for `trace`, at 32 bytes each; later events are dropped",
-       fmt::format("a whole number from 1 to {}", kMostTraceEvents)},
-      static_cast<std::int64_t>(options.trace_events), 1, kMostTraceEvents));
-  options.default_period = executor.default_period;
-  if (read_bounds(reader)) options.workload = executor.workload;
-  options.calibration = read_overheads(reader);
+  const bool counts_responses = reader.bounds() && options.workload && has_all_wcets(*options.workload);
+  if (!reader.trace().empty() || counts_responses) options.trace_capacity = kTraceCapacity;
   return options;
 }
 

@@ -5,8 +5,6 @@
 
 #include <algorithm>
 #include <set>
-#include <string_view>
-#include <tuple>
 #include <utility>
 
 #include "compat.hpp"
@@ -15,19 +13,6 @@
 namespace redag_rclcpp {
 
 using redag::Task;
-
-namespace {
-
-/// The scheduler breaks ties by ranks, then by ids. Ids depend on the order in which nodes were added, and a launch
-/// file may load components in any order. This keeps the order of `rank`, and among equals makes one of the names.
-std::uint32_t rank_by_name(std::uint32_t rank, const redag::CallbackId &id) {
-  constexpr std::uint32_t kNameBits = 20;
-  std::uint32_t hash = 0x811c9dc5;  // FNV-1a
-  for (const char c : to_string(id)) hash = (hash ^ static_cast<unsigned char>(c)) * 0x01000193;
-  return rank << kNameBits | hash >> (32 - kNameBits);
-}
-
-}  // namespace
 
 Registry::Registry(rclcpp::Context::SharedPtr context, const ReDAGOptions &options, std::uint32_t workers,
                    const Parts &parts)
@@ -235,7 +220,6 @@ void Registry::add(const Entity &found) {
   if (entry.id.name.empty() || found.owner != nullptr) entry.id.index = next_index_[{entry.id.node, kind}]++;
   entry.in_default_group = found.in_default_group;
   place(entry, found);
-  if (options_.lockstep) entry.rank = rank_by_name(entry.rank, entry.id);
 
   const std::shared_ptr<Callback> callback = found.make(executor_.lock(), entry.id);
   entry.callback = callback;
@@ -247,7 +231,6 @@ void Registry::add(const Entity &found) {
       [callback](const redag::runtime::Job &job) { return callback->execute(job); }, callback);
   parts_.tasks.set(task, std::move(entry));
   callbacks_[found.key] = callback;
-  ++changes_;
   if (callback->attach(task)) parts_.bridge.add(callback);
 }
 
@@ -279,46 +262,12 @@ void Registry::remove(const std::shared_ptr<Callback> &gone) {
   const std::shared_ptr<Callback> callback = gone;
   const auto entry = std::find_if(callbacks_.begin(), callbacks_.end(), [&](auto &e) { return e.second == callback; });
   if (entry != callbacks_.end()) callbacks_.erase(entry);
-  ++changes_;
   callback->detach();
   parts_.timer.settle();  // afterwards the id may be another task's
   parts_.bridge.remove(*callback);
   const redag::TaskId task = callback->task();
   parts_.tasks.drop(task);
   parts_.engine.remove_task(task);
-}
-
-// ---- lists ----
-
-std::vector<std::shared_ptr<Callback>> Registry::callbacks() const {
-  std::vector<std::shared_ptr<Callback>> all;
-  {
-    const redag::LockGuard guard(collect_lock_);
-    for (const auto &[key, callback] : callbacks_) all.push_back(callback);
-  }
-  std::sort(all.begin(), all.end(), [](const auto &left, const auto &right) {
-    const redag::CallbackId &a = left->id();
-    const redag::CallbackId &b = right->id();
-    return std::tuple(std::string_view(a.node), a.kind, std::string_view(a.name), a.index, left->task().value) <
-           std::tuple(std::string_view(b.node), b.kind, std::string_view(b.name), b.index, right->task().value);
-  });
-  return all;
-}
-
-std::vector<NodeBase::SharedPtr> Registry::nodes() const {
-  std::vector<NodeBase::SharedPtr> nodes;
-  const redag::LockGuard guard(collect_lock_);
-  for (const auto &weak : nodes_) {
-    if (auto node = weak.lock()) nodes.push_back(std::move(node));
-  }
-  for (const auto &[group, weak] : manual_groups_) {
-    if (auto node = weak.lock()) nodes.push_back(std::move(node));
-  }
-  std::sort(nodes.begin(), nodes.end(), [](const auto &a, const auto &b) {
-    return std::string_view(a->get_fully_qualified_name()) < std::string_view(b->get_fully_qualified_name());
-  });
-  nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
-  return nodes;
 }
 
 // ---- rates and names ----

@@ -69,17 +69,6 @@ class Registry {
   /// Returns true if it was stale before.
   bool set_stale() { return stale_.exchange(true); }
 
-  /// Counts changes of the callbacks.
-  [[nodiscard]] std::uint64_t changes() const { return changes_.load(std::memory_order_acquire); }
-  /// All callbacks, ordered by node, kind, name and creation.
-  [[nodiscard]] std::vector<std::shared_ptr<Callback>> callbacks() const;
-  [[nodiscard]] std::vector<NodeBase::SharedPtr> nodes() const;
-  /// Calls `function` while no callback comes or goes.
-  void while_unchanged(const std::function<void()> &function) const {
-    const redag::LockGuard guard(collect_lock_);
-    function();
-  }
-
   /// Gives callbacks the rates that were learned. Returns their number.
   std::size_t adopt_rates();
   /// The tasks of the workload that no callback matches, as text.
@@ -104,7 +93,6 @@ class Registry {
   std::weak_ptr<ExecutorContext> executor_;
   Groups groups_;
   std::atomic<bool> stale_{true};
-  std::atomic<std::uint64_t> changes_{0};
 
   template <class T>
   using ByGroup = std::map<rclcpp::CallbackGroup::WeakPtr, T, std::owner_less<rclcpp::CallbackGroup::WeakPtr>>;

@@ -120,12 +120,6 @@ class SubscriptionCallback final : public ArrivalCallback {
     const auto subscription = subscription_.lock();
     return subscription && compat::is_hooked_by_user(*subscription);
   }
-  void describe(Paced &paced) const override {
-    const auto subscription = subscription_.lock();
-    if (!subscription) return;
-    paced.publishers = subscription->get_publisher_count();
-    paced.best_effort = subscription->get_actual_qos().reliability() == rclcpp::ReliabilityPolicy::BestEffort;
-  }
   [[nodiscard]] bool handle(const Token &token, Taking &taking) override;
   [[nodiscard]] bool handle_intra_process(const Token &token);
   [[nodiscard]] bool handle_from_middleware(rclcpp::SubscriptionBase &subscription, Taking &taking);

@@ -9,7 +9,6 @@
 
 #include "compat.hpp"
 #include "entities.hpp"
-#include "lockstep.hpp"
 
 namespace redag_rclcpp {
 
@@ -83,7 +82,6 @@ class TimerCallback final : public Callback {
 
   void detach() override;
   void admit() override {}
-  void begin_instant(Time turn) override;
   [[nodiscard]] bool alive() const override { return !timer_.expired() && (!is_owned_ || !owner_.expired()); }
   [[nodiscard]] bool has_rate() const override { return true; }
   [[nodiscard]] Duration stated_period() const override { return period_of(*handle_); }
@@ -216,12 +214,9 @@ void TimerCallback::reschedule() {
 
 Time TimerCallback::expire(Time now, std::vector<Release> &releases, std::vector<Release> &missed) {
   const bool simulated = is_simulated(*handle_);
-  const bool follows = lockstep() != nullptr && lockstep()->follows();
-  if (follows && simulated) return kNever;  // see begin_instant()
   const TimerReading reading = read_timer(*handle_, engine());
   if (reading.cancelled) return kNever;
   if (reading.until > 0) return simulated ? kNever : next_look(now, saturated_add(reading.now, reading.until));
-  if ((follows || (simulated && lockstep() != nullptr)) && !is_ros_internal(id())) lockstep()->came_from_outside(*this);
 
   const Duration period = period_of(*handle_);
   if (simulated || period == 0) {
@@ -246,14 +241,6 @@ Time TimerCallback::expire(Time now, std::vector<Release> &releases, std::vector
     releases.push_back(Release{task(), nominal});
   }
   return next_look(now, saturated_add(nominal, period));
-}
-
-// An instant calls each timer that is due once, also one with a period of 0.
-void TimerCallback::begin_instant(Time turn) {
-  if (!is_simulated(*handle_)) return;
-  const TimerReading reading = read_timer(*handle_, engine());
-  if (reading.cancelled || reading.until > 0 || uncalled_.exchange(true)) return;
-  engine().release(Release{task(), turn}, engine().now());
 }
 
 // Consumes the expiry of a skipped job if no other job will. A timer with a grid needs none of this: the next point's

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Callbacks that await parameters of other nodes and clocks, in each mode with one worker. And what the detector of
+// Callbacks that await clocks, in each mode with one worker. And what the detector of
 // deadlocks says of callbacks that wait without a worker.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -21,7 +21,6 @@
 #include "rclcpp/rclcpp.hpp"
 #include "redag/runtime/blocking.hpp"
 #include "redag_rclcpp/coroutine.hpp"
-#include "redag_rclcpp/parameters_client.hpp"
 #include "rosgraph_msgs/msg/clock.hpp"
 #include "spinning.hpp"
 #include "test_msgs/srv/empty.hpp"
@@ -32,8 +31,6 @@ namespace {
 using namespace std::chrono_literals;
 using redag::Coroutine;
 using EmptyService = test_msgs::srv::Empty;
-using ::testing::ElementsAre;
-using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
 class AwaitTest : public ModeTest {
@@ -51,10 +48,9 @@ class AwaitTest : public ModeTest {
                                              })));
   }
   /// Spins until `condition` holds.
-  void spin_until(const std::function<bool()> &condition, const std::vector<rclcpp::Node::SharedPtr> &others = {}) {
+  void spin_until(const std::function<bool()> &condition) {
     ReDAGExecutor executor(options);
     executor.add_node(node);
-    for (const rclcpp::Node::SharedPtr &other : others) executor.add_node(other);
     const Spinner<ReDAGExecutor> spinner(executor);
     EXPECT_TRUE(eventually(condition));
   }
@@ -67,59 +63,6 @@ const auto kModes =
 std::string name_of(const ::testing::TestParamInfo<redag::PreemptionMode> &mode) { return to_string(mode.param); }
 
 INSTANTIATE_TEST_SUITE_P(Modes, AwaitTest, kModes, name_of);
-
-// ---- parameters ----
-
-TEST_P(AwaitTest, ParametersOfAnotherNode) {
-  const auto camera = std::make_shared<rclcpp::Node>("camera");
-  camera->declare_parameter("exposure", 10);
-  camera->declare_parameter("gain", 1.5);
-  camera->declare_parameter("lens.name", "wide");
-  const ParametersClient parameters(node, "/camera");  // in the group of the timer
-  using Names = std::vector<std::string>;
-  const Names both{"exposure", "gain"};  // GCC before 13 takes no lists in a co_await
-  const Names lens{"lens"};
-  const Names lens_name{"lens.name"};
-  const Names gain{"gain"};
-  const Names no_such{"no_such"};
-  std::atomic<bool> done{false};
-  once([&]() -> Coroutine {
-    const auto values = co_await parameters.get_parameters(both);
-    EXPECT_THAT(values.value(), ElementsAre(rclcpp::Parameter("exposure", 10), rclcpp::Parameter("gain", 1.5)));
-    const auto types = co_await parameters.get_parameter_types(lens_name, 1h);
-    EXPECT_THAT(types.value(), ElementsAre(rclcpp::ParameterType::PARAMETER_STRING));
-    const auto descriptors = co_await parameters.describe_parameters(gain);
-    EXPECT_EQ(descriptors.value().at(0).name, "gain");
-    const auto listed = co_await parameters.list_parameters(lens, 0);
-    EXPECT_THAT(listed.value().names, ElementsAre("lens.name"));
-    const std::vector<rclcpp::Parameter> wanted{rclcpp::Parameter("exposure", 20), rclcpp::Parameter("gain", "high")};
-    const auto set = co_await parameters.set_parameters(wanted);
-    EXPECT_THAT(set.value(), SizeIs(2));
-    EXPECT_TRUE(set.value().at(0).successful);
-    EXPECT_FALSE(set.value().at(1).successful) << "of another type";
-    const auto together = co_await parameters.set_parameters_atomically(wanted);
-    EXPECT_FALSE(together.value().successful);
-    const auto unknown = co_await parameters.get_parameters(no_such);
-    EXPECT_THAT(unknown.value(), IsEmpty());
-    done = true;
-  });
-  spin_until([&] { return done.load(); }, {camera});
-  EXPECT_EQ(camera->get_parameter("exposure").as_int(), 20);
-  EXPECT_EQ(camera->get_parameter("gain").as_double(), 1.5);
-}
-
-TEST_P(AwaitTest, ParametersOfANodeThatIsNotThere) {
-  const ParametersClient parameters(node.get(), "/nobody");
-  const std::vector<std::string> names{"a"};
-  std::atomic<bool> done{false};
-  once([&]() -> Coroutine {
-    const auto values = co_await parameters.get_parameters(names, 20ms);
-    EXPECT_FALSE(values.has_value());
-    done = true;
-  });
-  spin_until([&] { return done.load(); });
-  EXPECT_THROW(ParametersClient(node, ""), std::invalid_argument);
-}
 
 // ---- clocks ----
 
@@ -213,7 +156,7 @@ class BlockedTest : public AwaitTest {
     client = node->create_client<EmptyService>("/map");  // in the group of the timer
     elsewhere = std::make_unique<rclcpp::executors::SingleThreadedExecutor>();
     elsewhere->add_node(server_node);
-    options.spare_threads = 1;
+    options.threads = options.workers + 16;
   }
   void TearDown() override {
     release = true;

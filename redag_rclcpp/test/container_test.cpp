@@ -224,7 +224,7 @@ TEST_F(ContainerTest, ACallbackWaitsForItsOwnGroupsClientsWithOneWorker) {
     ASSERT_NE(loaded, nullptr);
     ASSERT_TRUE(loaded->success) << loaded->error_message;
   }
-  EXPECT_TRUE(eventually([&] { return text().find("plans with the map, cells of 0.05 m") != std::string::npos; }));
+  EXPECT_TRUE(eventually([&] { return text().find("plans with the map") != std::string::npos; }));
   container.interrupt();
   EXPECT_EQ(container.wait(), 0);
 }
@@ -255,8 +255,8 @@ TEST_F(ContainerTest, ComponentsRunAndResultsAreWrittenAtTheEnd) {
   const std::string config = folder_ / "robot.yaml";
   std::ofstream(config) << kWorkload;
   const std::filesystem::path results = folder_ / "results";
-  Process container = start({"--ros-args", "-p", "config:=" + config, "-p", "trace:=" + results.string(), "-p",
-                             "metrics_file:=" + (folder_ / "last.json").string(), "-p", "metrics_period:=0.1"});
+  Process container =
+      start({"--ros-args", "-p", "config:=" + config, "-p", "trace:=" + results.string(), "-p", "metrics_period:=0.1"});
   for (const char *plugin : {"Sensor", "Filter"}) {
     const auto loaded = load(plugin, {{"load", 0.001}});
     ASSERT_NE(loaded, nullptr);
@@ -296,7 +296,6 @@ TEST_F(ContainerTest, ComponentsRunAndResultsAreWrittenAtTheEnd) {
   container.interrupt();
   EXPECT_EQ(container.wait(), 0);
   EXPECT_THAT(text(), HasSubstr("wrote " + results.string()));
-  EXPECT_TRUE(std::filesystem::exists(folder_ / "last.json"));
   for (const char *name : {"summary.json", "jobs.csv", "trace.pftrace", "metrics.json"}) {
     EXPECT_TRUE(std::filesystem::exists(results / name)) << name;
   }

@@ -395,7 +395,7 @@ TEST_P(CoroutineTest, ADeviceServesACallback) {
 // A synchronous call with one worker: the client is in a group of its own, and the worker is lent.
 TEST_P(CoroutineTest, ACallThatBlocksLendsItsWorker) {
   serve("double");
-  options.spare_threads = 1;
+  options.threads = options.workers + 16;
   const auto group = groups.emplace_back(node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive));
   const auto client = node->create_client<Service>("double", compat::services_qos(), group);
   std::atomic<int> result{0};

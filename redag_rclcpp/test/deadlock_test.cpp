@@ -413,23 +413,6 @@ TEST_P(DeadlockTest, OthersAreNotNamed) {
   for (const Deadlock &deadlock : executor->deadlocks()) ADD_FAILURE() << deadlock.text;
 }
 
-TEST_P(DeadlockTest, CanBeSwitchedOff) {
-  options.deadlocks = false;
-  make_executors(2);
-  serve_elsewhere("/map");
-  const auto client = create_client(node, "/map", nullptr);
-  std::atomic<bool> begun{false};
-  once([&] {
-    begun = true;
-    call_and_wait(client);
-  });
-  ASSERT_TRUE(client->wait_for_service(kLimit));
-  spin();
-  ASSERT_TRUE(eventually([&] { return begun.load(); }));
-  std::this_thread::sleep_for(1500ms);
-  EXPECT_THAT(executor->deadlocks(), IsEmpty());
-}
-
 INSTANTIATE_TEST_SUITE_P(Modes, DeadlockTest,
                          ::testing::Values(redag::PreemptionMode::None, redag::PreemptionMode::Cooperative,
                                            redag::PreemptionMode::Os),

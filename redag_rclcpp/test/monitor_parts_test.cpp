@@ -229,6 +229,20 @@ TEST(Diagnoser, DeadlocksAreErrorsWhileTheyLast) {
   EXPECT_EQ(value_of(status(), "deadlocks that ended"), "2");
 }
 
+TEST(Diagnoser, BrokenPromisesAboutDeadlinesAreErrors) {
+  Snapshot snapshot = snapshot_of({});
+  Diagnoser diagnoser;
+  const auto status = [&] { return diagnoser.diagnose(snapshot).at(0); };
+  snapshot.warnings = {"memory is not locked", "the system refused 3 changes"};
+  EXPECT_EQ(status().level, DiagnosticStatus::WARN);
+  EXPECT_EQ(value_of(status(), "warning 1"), "memory is not locked");
+  snapshot.errors = {"the system refused 3 changes"};
+  EXPECT_EQ(status().level, DiagnosticStatus::ERROR);
+  EXPECT_THAT(status().message, HasSubstr("; the system refused 3 changes"));
+  snapshot.errors.clear();
+  EXPECT_EQ(status().level, DiagnosticStatus::WARN);
+}
+
 TEST(Diagnoser, WarnsOfExecutionsThatAreAllSomewhatLongerThanTheWcet) {
   TaskFigures task;
   task.stats = stats_of("control.loop", 10 * kMillisecond);

@@ -19,6 +19,7 @@
 #include "environment.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "redag/runtime/threads.hpp"
+#include "redag_rclcpp/monitor.hpp"
 
 namespace redag_rclcpp {
 namespace {
@@ -78,8 +79,6 @@ TEST_F(OptionsTest, Defaults) {
   const ReDAGOptions options = declare_options(*node);
   EXPECT_EQ(options.workers, 0U);
   EXPECT_EQ(options.preemption, redag::PreemptionMode::Auto);
-  EXPECT_EQ(options.policy, redag::PolicyKind::RateMonotonic);
-  EXPECT_EQ(options.ties, redag::Ties::Share);
   EXPECT_EQ(options.threads, 0U);
   EXPECT_TRUE(options.cpus.empty());
   EXPECT_FALSE(options.workload);
@@ -87,19 +86,13 @@ TEST_F(OptionsTest, Defaults) {
   EXPECT_EQ(options.learn, 10s);
   EXPECT_TRUE(options.raise_middleware);
   EXPECT_FALSE(options.lock_memory);
-  EXPECT_EQ(options.spin, 0ns);
   EXPECT_EQ(options.watchdog, 0ns);
-  EXPECT_TRUE(options.deadlocks);
   EXPECT_TRUE(options.live);
-  EXPECT_FALSE(options.share_order);
-  EXPECT_FALSE(options.lockstep);
   EXPECT_EQ(options.trace_capacity, 0U);
 
   const MonitorOptions monitor = declare_monitor_options(*node, options);
   EXPECT_EQ(monitor.period, 1s);
   EXPECT_EQ(monitor.trace, "");
-  EXPECT_FALSE(monitor.picture);
-  EXPECT_EQ(monitor.metrics_file, "");
   EXPECT_FALSE(monitor.workload);
 }
 
@@ -107,53 +100,35 @@ TEST_F(OptionsTest, ValuesAreRead) {
   const std::int64_t cpu = redag::runtime::usable_cpus().front();
   const auto node = node_with({{"workers", 2},
                                {"preemption", "cooperative"},
-                               {"policy", "deadline_monotonic"},
-                               {"ties", "fixed"},
                                {"threads", 7},
-                               {"spare_threads", 3},
                                {"cpu_affinity", std::vector<std::int64_t>{cpu}},
                                {"default_period", 0.02},
                                {"learn", 1.5},
                                {"raise_middleware", false},
                                {"lock_memory", true},
-                               {"spin", 0.00005},
                                {"watchdog", 2},
-                               {"deadlocks", false},
                                {"live", false},
-                               {"share_order", true},
-                               {"lockstep", true},
                                {"trace", "results"},
                                {"metrics_period", 0.25},
-                               {"picture", "never"},
                                {"trace_events", 10},
-                               {"metrics_file", "m.json"},
                                {"save_path", "s.yaml"}});
   const ReDAGOptions options = declare_options(*node);
   EXPECT_EQ(options.workers, 2U);
   EXPECT_EQ(options.preemption, redag::PreemptionMode::Cooperative);
-  EXPECT_EQ(options.policy, redag::PolicyKind::DeadlineMonotonic);
-  EXPECT_EQ(options.ties, redag::Ties::Fixed);
   EXPECT_EQ(options.threads, 7U);
-  EXPECT_EQ(options.spare_threads, 3U);
   EXPECT_EQ(options.cpus, std::vector<int>{static_cast<int>(cpu)});
   EXPECT_EQ(options.default_period, 20ms);
   EXPECT_EQ(options.learn, 1500ms);
   EXPECT_FALSE(options.raise_middleware);
   EXPECT_TRUE(options.lock_memory);
-  EXPECT_EQ(options.spin, 50us);
   EXPECT_EQ(options.watchdog, 2s);
-  EXPECT_TRUE(options.share_order);
-  EXPECT_TRUE(options.lockstep);
-  EXPECT_FALSE(options.deadlocks);
   EXPECT_FALSE(options.live);
   EXPECT_GT(options.trace_capacity, 0U);
 
   const MonitorOptions monitor = declare_monitor_options(*node, options);
   EXPECT_EQ(monitor.period, 250ms);
   EXPECT_EQ(monitor.trace, "results");
-  EXPECT_EQ(monitor.picture, false);
   EXPECT_EQ(monitor.trace_events, 10U);
-  EXPECT_EQ(monitor.metrics_file, "m.json");
   EXPECT_EQ(monitor.save_path, "s.yaml");
   EXPECT_EQ(monitor.default_period, 20ms);
 }
@@ -168,16 +143,17 @@ TEST_F(OptionsTest, TheWorkloadCountsWhereParametersAreAtTheirDefaults) {
   const ReDAGOptions from_file = options_with({{"config", file}});
   EXPECT_EQ(from_file.workers, 3U);
   EXPECT_EQ(from_file.preemption, redag::PreemptionMode::None);
-  EXPECT_EQ(from_file.policy, redag::PolicyKind::Edf);
-  EXPECT_EQ(from_file.ties, redag::Ties::Fixed);
   ASSERT_TRUE(from_file.workload);
   EXPECT_EQ(from_file.workload->name, "robot");
+  EXPECT_EQ(from_file.workload->policy, redag::PolicyKind::Edf);
+  EXPECT_EQ(from_file.workload->ties, redag::Ties::Fixed);
+  const auto config = ReDAGExecutor(from_file).as_trace({}).info.config;
+  EXPECT_EQ(config.policy, redag::PolicyKind::Edf);
+  EXPECT_EQ(config.ties, redag::Ties::Fixed);
 
-  const ReDAGOptions given =
-      options_with({{"config", file}, {"workers", 1}, {"preemption", "cooperative"}, {"policy", "fifo"}});
+  const ReDAGOptions given = options_with({{"config", file}, {"workers", 1}, {"preemption", "cooperative"}});
   EXPECT_EQ(given.workers, 1U);
   EXPECT_EQ(given.preemption, redag::PreemptionMode::Cooperative);
-  EXPECT_EQ(given.policy, redag::PolicyKind::Fifo);
 }
 
 TEST_F(OptionsTest, AFileThatSaysNoNumberOfWorkersLeavesItOpen) {
@@ -206,8 +182,6 @@ TEST_F(OptionsTest, MistakesSayWhichParameterWhatItIsAndWhatIsAllowed) {
   EXPECT_THAT(mistake_with({{"workers", 2.0}}), AllOf(HasSubstr("'workers'"), HasSubstr("2.0"), HasSubstr("whole")));
   EXPECT_THAT(mistake_with({{"preemption", "full"}}),
               AllOf(HasSubstr("'preemption'"), HasSubstr("full"), HasSubstr("auto, none, cooperative, os")));
-  EXPECT_THAT(mistake_with({{"policy", "rm"}}), AllOf(HasSubstr("'policy'"), HasSubstr("rm"), HasSubstr("edf")));
-  EXPECT_THAT(mistake_with({{"ties", "rr"}}), AllOf(HasSubstr("'ties'"), HasSubstr("rr"), HasSubstr("share, fixed")));
   EXPECT_THAT(mistake_with({{"threads", 2}, {"workers", 4}}),
               AllOf(HasSubstr("'threads'"), HasSubstr("is 2"), HasSubstr("4 workers")));
   EXPECT_THAT(mistake_with({{"cpu_affinity", std::vector<std::int64_t>{100'000}}}),
@@ -219,7 +193,6 @@ TEST_F(OptionsTest, MistakesSayWhichParameterWhatItIsAndWhatIsAllowed) {
               AllOf(HasSubstr("'raise_middleware'"), HasSubstr("true or false")));
   EXPECT_THAT(mistake_with({{"bounds", "yes"}}), AllOf(HasSubstr("'bounds'"), HasSubstr("true or false")));
   EXPECT_THAT(mistake_with({{"trace", 3}}), AllOf(HasSubstr("'trace'"), HasSubstr("folder")));
-  EXPECT_THAT(mistake_with({{"picture", true}}), AllOf(HasSubstr("'picture'"), HasSubstr("auto, always, never")));
   EXPECT_THAT(mistake_with({{"trace_events", 0}}), AllOf(HasSubstr("'trace_events'"), HasSubstr("from 1")));
   EXPECT_THAT(mistake_with({{"metrics_period", std::numeric_limits<double>::quiet_NaN()}}),
               AllOf(HasSubstr("'metrics_period'"), HasSubstr("nan")));
@@ -289,11 +262,10 @@ rclcpp::ParameterValue any_value(std::mt19937_64 &random, const std::string &wor
 
 // REDAG_SEED chooses the values, REDAG_OPTION_ROUNDS the number of rounds.
 TEST_F(OptionsTest, AnyValuesAreReadOrRefused) {
-  const std::vector<std::string> names{
-      "workers",        "preemption",   "policy",           "ties",      "threads",        "cpu_affinity", "config",
-      "default_period", "learn",        "raise_middleware", "live",      "metrics_period", "trace",        "bounds",
-      "trace_events",   "metrics_file", "save_path",        "overheads", "deadlocks",      "events",       "picture",
-      "spare_threads"};
+  const std::vector<std::string> names{"workers",      "preemption",     "threads",  "cpu_affinity",
+                                       "config",       "default_period", "learn",    "raise_middleware",
+                                       "live",         "metrics_period", "trace",    "bounds",
+                                       "trace_events", "save_path",      "overheads"};
   const std::string workload = file_with(kWorkload);
   const std::uint64_t seed = from_environment("REDAG_SEED", 1);
   const std::uint64_t rounds = from_environment("REDAG_OPTION_ROUNDS", 400);
@@ -345,11 +317,9 @@ TEST_F(OptionsTest, ParametersSayWhatTheyAreAndStay) {
   const auto node = node_with({});
   const ReDAGOptions options = declare_options(*node);
   (void)declare_monitor_options(*node, options);
-  for (const char *name : {"workers",      "preemption",  "policy",         "ties",           "threads",
-                           "cpu_affinity", "config",      "default_period", "learn",          "raise_middleware",
-                           "lock_memory",  "spin",        "watchdog",       "metrics_period", "trace",
-                           "events",       "picture",     "bounds",         "trace_events",   "metrics_file",
-                           "save_path",    "share_order", "spare_threads",  "lockstep"}) {
+  for (const char *name :
+       {"workers", "preemption", "threads", "cpu_affinity", "config", "default_period", "learn", "raise_middleware",
+        "lock_memory", "watchdog", "metrics_period", "trace", "bounds", "trace_events", "save_path"}) {
     const auto descriptor = node->describe_parameter(name);
     EXPECT_FALSE(descriptor.description.empty()) << name;
     EXPECT_FALSE(descriptor.additional_constraints.empty()) << name;

@@ -19,11 +19,11 @@
 #include <utility>
 #include <vector>
 
-#include "bag_recording.hpp"
 #include "command_line.hpp"
 #include "component_containers.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "rclcpp/serialization.hpp"
+#include "rosbag2_cpp/reader.hpp"
 #include "rosbag2_cpp/writer.hpp"
 #include "sensor_msgs/msg/image.hpp"
 #include "sensor_msgs/msg/imu.hpp"
@@ -118,34 +118,34 @@ std::vector<Component> components(const Setting &setting, const StackRun &run) {
 
 /// The number that a sensor gave its message.
 template <class Message>
-std::int64_t number_of(const redag_rclcpp::lab::RecordedMessage &recorded) {
+std::int64_t number_of(const rclcpp::SerializedMessage &recorded) {
   Message message;
-  rclcpp::Serialization<Message>().deserialize_message(&recorded.data, &message);
+  rclcpp::Serialization<Message>().deserialize_message(&recorded, &message);
   return std::stoll(message.header.frame_id);
 }
 
-/// Counts what the bag has and what it lacks, without the first seconds, of images and of small messages.
+/// Counts what the bag has and what it lacks, without the first seconds, of images and of small messages. Throws what
+/// rosbag2 throws if the bag cannot be read.
 Figures count_recorded(const std::string &folder) {
-  const auto bag = redag_rclcpp::lab::open_bag(folder, {});
-  if (!bag) throw std::runtime_error(to_string(bag.error()));
-  std::map<std::size_t, std::int64_t> last;
+  rosbag2_cpp::Reader bag;
+  bag.open(folder);
+  std::map<std::string, std::int64_t> last;
   Figures figures = {{"images recorded", 0}, {"images lost", 0}, {"small recorded", 0}, {"small lost", 0}};
   std::optional<redag::Time> begin;
-  redag_rclcpp::lab::RecordedMessage message;
-  for (;;) {
-    const auto has_one = (*bag)->next(message);
-    if (!has_one) throw std::runtime_error(to_string(has_one.error()));
-    if (!*has_one) return figures;
-    if (!begin) begin = message.time + static_cast<redag::Duration>(kWarmUp * redag::kSecond);
-    if (message.time < *begin) continue;
-    const bool is_image = (*bag)->topics()[message.topic].name == "/camera";
+  while (bag.has_next()) {
+    const auto recorded = bag.read_next();
+    if (!begin) begin = recorded->recv_timestamp + static_cast<redag::Duration>(kWarmUp * redag::kSecond);
+    if (recorded->recv_timestamp < *begin) continue;
+    const rclcpp::SerializedMessage message(*recorded->serialized_data);
+    const bool is_image = recorded->topic_name == "/camera";
     const std::int64_t number = is_image ? number_of<Image>(message) : number_of<Imu>(message);
     const std::string kind = is_image ? "images" : "small";
     ++figures[kind + " recorded"];
-    const auto before = last.find(message.topic);
+    const auto before = last.find(recorded->topic_name);
     if (before != last.end()) figures[kind + " lost"] += static_cast<double>(number - before->second - 1);
-    last[message.topic] = number;
+    last[recorded->topic_name] = number;
   }
+  return figures;
 }
 
 Figures measure(const StackRun &run, const StackOptions &options, const Setting &setting) {

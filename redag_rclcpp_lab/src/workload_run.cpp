@@ -123,8 +123,6 @@ class Run {
       ReDAGOptions redag;
       redag.workers = workers_;
       redag.preemption = preemption_of(name).value_or(workload_.platform.preemption);
-      redag.policy = workload_.policy;
-      redag.ties = workload_.ties;
       redag.threads = workers_ + kSpareThreads;
       redag.cpus = workload_.platform.cpus;
       redag.workload = nodes_->bound_workload();

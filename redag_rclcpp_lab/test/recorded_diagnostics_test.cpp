@@ -12,13 +12,14 @@
 #include <string>
 #include <thread>
 
-#include "bag_recording.hpp"
 #include "diagnostic_msgs/msg/diagnostic_array.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "rclcpp/serialization.hpp"
 #include "redag/model/workload_yaml.hpp"
 #include "redag_rclcpp/executor.hpp"
 #include "redag_rclcpp/monitor.hpp"
+#include "rosbag2_cpp/reader.hpp"
+#include "rosbag2_storage/storage_filter.hpp"
 #include "rosbag2_transport/recorder.hpp"
 
 namespace redag_rclcpp::lab {
@@ -37,18 +38,22 @@ dags:
 
 /// Reads all diagnostics of a bag.
 std::vector<DiagnosticArray> diagnostics_of(const std::string &folder) {
-  const auto bag = open_bag(folder, {"/diagnostics"});
-  EXPECT_TRUE(bag) << to_string(bag.error());
+  rosbag2_cpp::Reader bag;
+  bag.open(folder);
+  rosbag2_storage::StorageFilter filter;
+  filter.topics = {"/diagnostics"};
+  bag.set_filter(filter);
   std::vector<DiagnosticArray> all;
-  if (!bag) return all;
   redag::Time last = 0;
-  for (RecordedMessage message; *(*bag)->next(message);) {
+  while (bag.has_next()) {
+    const auto recorded = bag.read_next();
+    const rclcpp::SerializedMessage message(*recorded->serialized_data);
     DiagnosticArray array;
-    rclcpp::Serialization<DiagnosticArray>().deserialize_message(&message.data, &array);
+    rclcpp::Serialization<DiagnosticArray>().deserialize_message(&message, &array);
     // The middleware's time of arrival, which the executor passes on to the Recorder.
-    EXPECT_GE(message.time, rclcpp::Time(array.header.stamp).nanoseconds());
-    EXPECT_GE(message.time, last);
-    last = message.time;
+    EXPECT_GE(recorded->recv_timestamp, rclcpp::Time(array.header.stamp).nanoseconds());
+    EXPECT_GE(recorded->recv_timestamp, last);
+    last = recorded->recv_timestamp;
     all.push_back(array);
   }
   return all;

@@ -45,16 +45,14 @@ enum class OnException : std::uint8_t {
 struct ReDAGOptions {
   std::uint32_t workers = 0;  // callbacks that execute at the same time; 0: one per usable processor
   redag::PreemptionMode preemption = redag::PreemptionMode::Auto;
-  redag::PolicyKind policy = redag::PolicyKind::RateMonotonic;
-  redag::Ties ties = redag::Ties::Share;  // callbacks of equal priority: earlier release first, or a fixed order
-  std::uint32_t threads = 0;              // os: callbacks that can be started and unfinished at once; 0: workers + 16
-  /// none, cooperative: callbacks that can be in a redag::Blocking without a worker at a time, with a thread for each.
-  std::uint32_t spare_threads = 0;
+  /// Callbacks that can be started and unfinished at once. With none and cooperative, those beyond `workers` are in a
+  /// redag::Blocking, without a worker. 0: with os workers + 16, otherwise as many as workers.
+  std::uint32_t threads = 0;
   std::vector<int> cpus{};               // processors for the workers; empty: os takes `workers` of the usable ones
   std::vector<redag::Device> devices{};  // accelerators for redag_rclcpp::device() (coroutine.hpp)
 
-  /// States which callback is which task of which DAG (docs/workload_format.md, `callback`). The executor does not read
-  /// the workload's platform and policy; declare_options() does.
+  /// States which callback is which task of which DAG (docs/workload_format.md, `callback`). Its policy and ties
+  /// decide the order. The executor does not read its platform; declare_options() does.
   std::optional<redag::Workload> workload{};
   /// Period of a callback whose period neither the workload nor a timer states. It decides the callback's priority
   /// until a rate is learned. Must be above 0.
@@ -69,23 +67,10 @@ struct ReDAGOptions {
   /// Locks memory as the process uses it, and touches the stacks of the threads beforehand, to spare callbacks page
   /// faults. warnings() tells if the system refuses.
   bool lock_memory = false;
-  /// none, cooperative: time for which an idle worker looks for a job before it sleeps.
-  std::chrono::nanoseconds spin{};
   /// Logs a warning about each callback that is in progress for longer than this, while it runs; 0: no watchdog. With a
   /// watchdog, `on_budget` and HI mode also take effect in callbacks without preemption points.
   std::chrono::nanoseconds watchdog{};
-  /// While spin() runs, logs each callback that waits for a response which cannot reach it, because the callback itself
-  /// or others that wait like it keep the response's callback from starting (docs/ros2.md, "A call that waits for
-  /// itself"). deadlocks() returns them.
-  bool deadlocks = true;
   std::size_t trace_capacity = 0;  // events that the rings hold between two drain_trace(); 0: no events
-  /// os, rate_monotonic or deadline_monotonic: shares one order with the other executors of this user that do so, also
-  /// in other processes. The variable REDAG_SHARE_ORDER overrides it.
-  bool share_order = false;
-  /// Runs the callbacks of one instant of simulated time after the other, in an order that each replay repeats, as a
-  /// player announces them (docs/ros2.md, "Replay in lockstep"). One callback at a time: overrides workers, preemption,
-  /// threads, spare_threads, learn and share_order, and leaves out budgets. Takes effect in spin().
-  bool lockstep = false;
   bool live = false;  // shows the executor in `redag top`: a page of shared memory, and a thread that updates it
   /// Called on the thread that executed the callback; must not throw. Empty: Stop.
   std::function<OnException(const ExceptionInfo &)> on_exception{};
@@ -161,8 +146,13 @@ class ReDAGExecutor : public rclcpp::Executor {
   /// Warnings for the user: for instance too few processors, tasks of the workload that no callback matches, or
   /// middleware threads that could not be raised.
   [[nodiscard]] std::vector<std::string> warnings() const;
+  /// Those of warnings() that break a promise about deadlines now. With os: more workers than processors, priorities
+  /// that the system refuses, or an order that is lost.
+  [[nodiscard]] std::vector<std::string> errors() const;
 
-  /// The deadlocks that were noticed, in the order of their beginning; the last 100. See ReDAGOptions::deadlocks.
+  /// Callbacks that waited, while spin() ran, for a response which cannot reach them: the callback itself, or others
+  /// that wait like it, keep the response's callback from starting (docs/ros2.md, "A call that waits for itself"). In
+  /// the order of their beginning; the last 100. The log names each.
   [[nodiscard]] std::vector<Deadlock> deadlocks() const;
 
   /// Live figures of all callbacks, shortest period first. Cheap enough to call once a second.

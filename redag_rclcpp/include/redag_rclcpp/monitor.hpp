@@ -29,9 +29,7 @@ struct MonitorOptions {
   /// Folder for events.redag, jobs.csv, summary.json, trace.pftrace and metrics.json; created if missing. "": no files.
   /// Needs ReDAGOptions::trace_capacity.
   std::string trace{};
-  std::optional<bool> picture{};  // whether there is a trace.pftrace; unset: of traces with at most 500,000 events
   std::size_t trace_events = 10'000'000;  // number of first events that are kept, at 32 bytes each
-  std::string metrics_file{};             // file for the last snapshot; "": none besides the one in `trace`
 
   /// File that ~/save writes; the default of the node's parameter of this name.
   std::string save_path = "redag_workload.yaml";
@@ -48,6 +46,10 @@ struct MonitorOptions {
   /// charged.
   std::optional<redag::Calibration> calibration{};
 };
+
+/// Declares and reads the parameters of a monitor whose executor gets `executor`: metrics_period, save_path,
+/// trace, trace_events, bounds, overheads. See options.hpp.
+[[nodiscard]] MonitorOptions declare_monitor_options(rclcpp::Node &node, const ReDAGOptions &executor);
 
 class Monitor {
  public:

@@ -1,28 +1,24 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Reads ROS parameters of a node as options of the executor and of its monitor. The parameters carry descriptions:
+// Reads ROS parameters of a node as options of the executor (monitor.hpp: of its monitor). They carry descriptions:
 // `ros2 param describe` tells what docs/ros2.md tells. Also reads the workload file; keeps no state. Call from one
 // thread, before spinning.
 #pragma once
 
 #include "rclcpp/node.hpp"
 #include "redag_rclcpp/executor.hpp"
-#include "redag_rclcpp/monitor.hpp"
 
 namespace redag_rclcpp {
 
-/// Declares (unless declared already) and reads these parameters: workers, preemption, policy, ties, threads,
-/// spare_threads, cpu_affinity, config, default_period, learn, raise_middleware, lock_memory, spin, watchdog,
-/// deadlocks, live, share_order, lockstep, trace, bounds. They are read-only from then on.
+/// Declares (unless declared already) and reads these parameters: workers, preemption, threads, cpu_affinity,
+/// config, default_period, learn, raise_middleware, lock_memory, watchdog, live, trace, bounds. They are read-only from
+/// then on.
 ///
-/// `config` names a workload file. The file's platform and policy count where the parameter has its default. Throws
+/// `config` names a workload file. The file's policy decides the order. Its platform counts where the parameter
+/// has its default. Throws
 /// rclcpp::exceptions::InvalidParameterValueException, whose text names the parameter, its value, and the allowed
 /// values. Mistakes in the workload are listed all at once, each as file:line.
 [[nodiscard]] ReDAGOptions declare_options(rclcpp::Node &node);
-
-/// Declares and reads the parameters of a monitor whose executor gets `executor`: metrics_period, metrics_file,
-/// save_path, trace, trace_events, bounds, overheads.
-[[nodiscard]] MonitorOptions declare_monitor_options(rclcpp::Node &node, const ReDAGOptions &executor);
 
 }  // namespace redag_rclcpp

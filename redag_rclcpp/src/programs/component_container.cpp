@@ -50,14 +50,8 @@ Parameters, with their defaults:
                          0: one per processor
   thread_num             the same under rclcpp's name
   preemption auto        auto, os, cooperative or none
-  policy rate_monotonic  rate_monotonic, deadline_monotonic, fixed, edf, fifo
-                         or chain_aware
-  ties share             order of equal priorities: share (earlier release
-                         first) or fixed
-  threads 0              with os: callbacks started and unfinished at once;
-                         0: workers + 16
-  spare_threads 0        with none and cooperative: callbacks that can block at
-                         a time in a redag::Blocking without a worker
+  threads 0              callbacks started and unfinished at once, also in a
+                         redag::Blocking; 0: with os workers + 16, else workers
   cpu_affinity []        processors of the workers; empty: all
   default_period 0.1     period in seconds of callbacks without a known one
   learn 10.0             seconds from its first message in which the rate of a
@@ -65,26 +59,15 @@ Parameters, with their defaults:
   raise_middleware true  with os: raise the middleware's threads above the
                          workers
   lock_memory false      lock memory and touch stacks, to avoid page faults
-  spin 0.0               seconds for which an idle worker looks for work;
-                         not with os
   watchdog 0.0           warn about callbacks in progress for longer than
                          these seconds; 0: no warnings
-  deadlocks true         name callbacks that wait for a response which cannot
-                         reach them
   live true              let 'redag top' show the executor (a page of memory
                          that only its owner can read)
-  lockstep false         run callbacks in the same order in each replay of a
-                         recording by play_lockstep
-  share_order false      with os: share one order of priorities with the
-                         executors of other processes that do so
   metrics_period 1.0     seconds between two messages on /diagnostics and
                          ~/metrics; 0: no messages
   bounds true            compare response times with their bounds
   trace ""               folder for results, written at the end
-  picture auto           trace.pftrace: auto (of at most 500 000 events),
-                         always or never
   trace_events 10000000  number of events kept for the trace
-  metrics_file ""        file for the last metrics, written at the end
   save_path redag_workload.yaml
                          file to which ~/save writes the learned workload
   overheads ""           file of overheads from 'redag calibrate'

@@ -109,7 +109,8 @@ DiagnosticStatus executor_status(const Snapshot &snapshot) {
     status.values.push_back(pair(fmt::format("deadlock {}", ++count), deadlock.text));
     is_locked = is_locked || deadlock.certain;
   }
-  if (is_locked) status.level = DiagnosticStatus::ERROR;
+  for (const std::string &error : snapshot.errors) warn(status, error);
+  if (is_locked || !snapshot.errors.empty()) status.level = DiagnosticStatus::ERROR;
   status.values.push_back(pair("deadlocks that ended", std::to_string(snapshot.deadlocks.size() - count)));
   return status;
 }

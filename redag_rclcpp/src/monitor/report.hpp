@@ -34,6 +34,7 @@ struct Snapshot {
   redag::PolicyKind policy = redag::PolicyKind::RateMonotonic;
   bool learning = false;
   std::vector<std::string> warnings;
+  std::vector<std::string> errors;  // those of `warnings` that break a promise about deadlines
   std::vector<Deadlock> deadlocks;  // those that last and those that have ended
   bool has_bounds = false;
   std::string bounds_absent;                // reason why some tasks have no bound; empty: all have one

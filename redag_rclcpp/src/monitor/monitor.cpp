@@ -165,6 +165,7 @@ Snapshot Monitor::Impl::snapshot() {
   result.policy = config_.policy;
   result.learning = !executor_.learning_done();
   result.warnings = executor_.warnings();
+  result.errors = executor_.errors();
   result.deadlocks = executor_.deadlocks();
   const std::vector<CallbackStats> stats = executor_.stats();
   const redag::LockGuard guard(bounds_lock_);
@@ -313,8 +314,8 @@ redag::Result<void> Monitor::Impl::finish() {
   RCLCPP_INFO(node_->get_logger(), "%s", summarize(last).c_str());
 
   redag::Diagnostics problems;
-  const auto write_metrics = [&](const std::string &path) {
-    auto file = redag::trace::OutputFile::create(path);
+  if (has_trace) {
+    auto file = redag::trace::OutputFile::create(options_.trace + "/metrics.json");
     redag::Result<void> written;
     if (file) {
       file->write(to_json(last) + "\n");
@@ -322,15 +323,8 @@ redag::Result<void> Monitor::Impl::finish() {
     } else {
       written = tl::unexpected<redag::Diagnostics>(file.error());
     }
-    if (!written) problems.insert(problems.end(), written.error().begin(), written.error().end());
-  };
-  if (!options_.metrics_file.empty()) write_metrics(options_.metrics_file);
-  if (has_trace) {
-    write_metrics(options_.trace + "/metrics.json");
-    using redag::metrics::Picture;
-    redag::metrics::FilesOptions files{.folder = options_.trace};
-    if (options_.picture) files.picture = *options_.picture ? Picture::Always : Picture::Never;
-    const redag::Diagnostics more = keeper_.write(files, executor_);
+    if (!written) problems = written.error();
+    const redag::Diagnostics more = keeper_.write({.folder = options_.trace}, executor_);
     problems.insert(problems.end(), more.begin(), more.end());
     if (problems.empty()) {
       RCLCPP_INFO(node_->get_logger(), "wrote %s: metrics.json, %s ('redag report %s' makes a page of them)",

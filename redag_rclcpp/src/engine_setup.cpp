@@ -1,0 +1,71 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+#include "engine_setup.hpp"
+
+#include <chrono>
+#include <stdexcept>
+#include <utility>
+
+#include "redag/model/validate.hpp"
+#include "redag/runtime/executor_options.hpp"
+#include "redag/runtime/threads.hpp"
+#include "redag/sched/priority_scheduler.hpp"
+
+namespace redag_rclcpp {
+
+using std::chrono::nanoseconds;
+
+ReDAGOptions prepare(ReDAGOptions options) {
+  if (options.default_period <= nanoseconds(0)) {
+    throw std::invalid_argument(
+        "default_period must be greater than 0, because callbacks with shorter periods are more urgent");
+  }
+  if (options.watchdog < nanoseconds(0)) throw std::invalid_argument("watchdog must not be negative");
+  redag::runtime::check_devices("ReDAGOptions::devices", options.devices);
+  if (!options.workload) return options;
+  const auto findings = redag::validate(*options.workload, redag::ValidateOptions{.wcet_optional = true});
+  if (has_errors(findings)) throw std::runtime_error(to_string(findings));
+  for (redag::Dag &dag : options.workload->dags) redag::inherit_periods(dag);
+  return options;
+}
+
+redag::runtime::Setup set_up(const ReDAGOptions &options) {
+  auto setup = redag::runtime::set_up({.preemption = options.preemption,
+                                       .policy = options.workload ? options.workload->policy : redag::Workload().policy,
+                                       .ties = options.workload ? options.workload->ties : redag::Workload().ties,
+                                       .workers = options.workers,
+                                       .threads = options.threads,
+                                       .cpus = options.cpus});
+  if (!setup) throw std::runtime_error(to_string(setup.error()));
+  return *std::move(setup);
+}
+
+std::unique_ptr<redag::runtime::Engine> make_engine(
+    const ReDAGOptions &options, const redag::runtime::Setup &setup, redag::Time origin,
+    std::function<void(const redag::runtime::Job &, std::exception_ptr)> on_exception) {
+  redag::runtime::EngineOptions engine_options;
+  if (options.lock_memory) engine_options.touched_stack = redag::runtime::kTouchedStack;
+  engine_options.config = setup.config;
+  engine_options.config.reuse_ids = options.trace_capacity == 0;  // in a trace an id stands for one task
+  engine_options.band = setup.band;
+  engine_options.order_folder = setup.order_folder;
+  engine_options.cpus = options.cpus;
+  if (setup.mode.mode != redag::PreemptionMode::Os && options.threads > setup.config.workers) {
+    engine_options.spare_threads = options.threads - setup.config.workers;
+  }
+  engine_options.trace_capacity = options.trace_capacity;
+  engine_options.measure = options.live;
+  engine_options.waits_priority = setup.timer_priority();
+  engine_options.start_paused = true;
+  engine_options.on_exception = std::move(on_exception);
+  engine_options.devices = options.devices;
+  redag::Workload empty;
+  empty.platform.devices = options.devices;
+  auto scheduler = std::make_unique<redag::sched::PriorityScheduler>(empty, engine_options.config);
+  auto engine = std::make_unique<redag::runtime::Engine>(std::move(scheduler), std::move(engine_options));
+  engine->set_origin(origin);
+  return engine;
+}
+
+}  // namespace redag_rclcpp
