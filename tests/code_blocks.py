@@ -124,7 +124,7 @@ class Page:
         (self.folder / name).write_text(block.text, encoding="utf-8")
         quoted = shlex.quote(name)
         if re.search(r"(?m)^experiment: ", block.text):
-            self.call(f"redag experiment {quoted} --out one_unit --shard 1/1000000")
+            self.call(f"redag experiment {quoted} --out unit_of_line{block.line} --shard 1/1000000")
         elif re.search(r"(?m)^overheads:", block.text):
             self.call(f"redag analyze workloads/robot.yaml --overheads {quoted}")
         else:

@@ -78,7 +78,6 @@ class Examples(Case):
             return
         self.expect(redag(*RESULTS[place], "--out", place, cwd=self.folder), 0)
 
-
     def running_executor(self):
         """Returns the process ID of a run that `redag top` can watch. The first call starts it."""
         if self.watched is not None and self.watched.poll() is None:
@@ -98,7 +97,7 @@ class Examples(Case):
     def adapted(self, command, example):
         """Returns the example with the differences that the top of this file states."""
         name = command[0]
-        if name in ("run", "calibrate") or (name == "compare" and "--simulate" not in example):
+        if name in ("run", "calibrate") or (name == "compare" and ".yaml" in example and "--simulate" not in example):
             length = CALIBRATION if name == "calibrate" else SHORT
             shorter = re.sub(r"--duration \S+", f"--duration {length}", example)
             example = shorter if shorter != example else re.sub(rf"(redag {name}(?: \S+\.yaml)?)", rf"\1 --duration {length}", example)
