@@ -52,8 +52,8 @@ void commands_target(std::string_view input) {
   REDAG_CHECK(answers({"analyze", file, "--json"}), "analyze");
   constexpr std::size_t kMostTasks = 4;  // limit for the commands that analyse repeatedly
   if (loaded->workload.task_count() > kMostTasks) return;
-  const bool has_clusters = !loaded->workload.platform.clusters.empty();  // which sensitivity refuses
-  REDAG_CHECK(has_clusters || answers({"sensitivity", file, "--json"}), "sensitivity");
+  if (!loaded->workload.platform.clusters.empty()) return;  // these commands refuse clusters
+  REDAG_CHECK(answers({"sensitivity", file, "--json"}), "sensitivity");
   REDAG_CHECK(answers({"tune", "--judge", "bounds", file, "--json"}), "tune --judge bounds");
 }
 
