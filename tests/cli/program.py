@@ -107,6 +107,8 @@ def in_terminal(*arguments, columns=80, **environment):
     if pid == 0:
         os.environ.update(TERM="xterm", **environment)
         try:
+            while os.get_terminal_size(0).columns == 0:  # the other side has not set it yet
+                time.sleep(0.001)
             os.execv(PROGRAM, [str(PROGRAM), *map(str, arguments)])
         finally:
             os._exit(127)
