@@ -15,13 +15,14 @@
 #include <chrono>
 #include <cstring>
 #include <filesystem>
-#include <mutex>
 #include <optional>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "redag/base/check.hpp"
+#include "redag/base/lock_guard.hpp"
+#include "redag/base/mutex.hpp"
 #include "redag/trace/output_file.hpp"
 
 namespace redag::experiment {
@@ -154,14 +155,14 @@ Result<void> run_units(const std::vector<std::uint64_t> &units, std::uint32_t jo
                        const Evaluate &evaluate, const Accept &accept) {
   std::atomic<std::size_t> next{0};
   std::atomic<bool> failed{false};
-  std::mutex mutex;  // guards `done` and calls of `accept`
+  Mutex mutex;  // guards `done` and calls of `accept`
   Result<void> done;
   const auto work = [&] {
     while (!stop && !failed) {
       const std::size_t mine = next++;
       if (mine >= units.size()) return;
       const Result<std::string> result = evaluate(units[mine]);
-      const std::lock_guard lock(mutex);
+      const LockGuard lock(mutex);
       if (!done) return;
       if (result) {
         done = accept(units[mine], *result);
