@@ -246,7 +246,7 @@ void Engine::release_at(std::span<const Release> releases, Time at) {
   Locked locked(*this, releases.size());
   withdraw_if_halting(locked);
   if (halted_at_ != kNever) return;
-  const Sender sender = note_release(at);
+  const Sender sender = lookout_ ? note_release(at) : nullptr;
   do {
     const auto lot = releases.first(std::min(releases.size(), sched::kMostReleasesAtOnce));
     for (const Release &release : lot) scheduler_->release(release.task, release.nominal, at, release.origin);
