@@ -41,10 +41,10 @@ struct Taker {
 
 /// What a decision is placed under.
 struct Situation {
-  Time now = 0;           // when it was taken
-  bool waited = false;    // the calling thread waited for the engine's lock
-  bool may_lead = false;  // releases are expected: an idle thread can wait for them
-  Sender sender = nullptr;
+  Time now = 0;             // when it was taken
+  bool waited = false;      // the calling thread waited for the engine's lock
+  bool may_lead = false;    // releases are expected: an idle thread can wait for them
+  Sender sender = nullptr;  // it releases the jobs from its body, and may take one of them at its end
 };
 
 class JobPlacement {
