@@ -255,6 +255,16 @@ void Engine::release_at(std::span<const Release> releases, Time at) {
   } while (!releases.empty());
 }
 
+void Engine::receive(const Release &message, Time at) {
+  const RunningJob *const job = current_job();
+  Locked locked(*this, 1);
+  withdraw_if_halting(locked);
+  if (halted_at_ != kNever) return;
+  const Sender sender = lookout_ ? note_release(at) : nullptr;
+  scheduler_->receive(message.task, job == nullptr ? TaskId() : job->task, message.nominal, at, message.origin);
+  decide(locked, at, nullptr, sender);
+}
+
 // Notes when the calling job first releases another. Returns its thread if it is expected to end soon and then takes a
 // job: one that has a job below does not.
 Sender Engine::note_release(Time at) {

@@ -175,6 +175,9 @@ class Engine {
   void release(TaskId task, Time nominal);
   /// As above, for a caller that has just read now(): the job arrives at `at`.
   void release(const Release &release, Time at) { release_at(std::span(&release, 1), at); }
+  /// Reports that a message for a data task came at message.nominal (sched::Scheduler::receive); the calling thread
+  /// read now() as `at`. A job of this engine that the thread is in sends it.
+  void receive(const Release &message, Time at);
   /// Reports that what jobs wait for has happened: a list of waits, by detail::Wait::next, of any engines. Each engine
   /// decides once, when it knows of all its jobs. From any thread.
   static void wake_all(detail::Wait *waits);
@@ -196,6 +199,7 @@ class Engine {
   /// As remove_dag(), and cancels the waits of the task's jobs. With reuse_ids, the caller must not use the id from
   /// here on.
   void remove_task(TaskId task);
+  void set_predecessors(TaskId task, std::span<const TaskId> predecessors);
   void set_timing(TaskId task, Duration period, Duration deadline);
   /// When set_timing() was last called.
   [[nodiscard]] std::optional<Time> settled() const;

@@ -84,6 +84,14 @@ void Engine::remove_task(TaskId task) {
   decide(locked, at);
 }
 
+void Engine::set_predecessors(TaskId task, std::span<const TaskId> predecessors) {
+  const Time at = now();
+  Locked locked(*this);
+  withdraw_if_halting(locked);
+  scheduler_->set_predecessors(task, predecessors, at);
+  decide(locked, at);
+}
+
 void Engine::set_timing(TaskId task, Duration period, Duration deadline) {
   const Time at = now();
   Locked locked(*this);

@@ -31,6 +31,7 @@ DagId JobTable::append_dag(const Dag &dag) {
 
 TaskId JobTable::append_task(DagId dag, std::uint32_t rank, const Task &task) {
   const TaskId id = add_state(dag, rank, task);
+  tasks[id.value].on_grid = false;
   precedence.add_task(task, id);
   reserve_step();
   return id;

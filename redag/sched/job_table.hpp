@@ -46,6 +46,7 @@ struct alignas(64) TaskState {
   OnBudget on_budget = OnBudget::Abort;
   bool skips_next = false;  // a job used its budget: the next release is skipped
   bool degraded = false;    // HI mode, and its DAG is of lower criticality: its jobs are demoted from the start
+  bool on_grid = true;      // its releases are points of a grid, or it has no releases of its own
 
   std::uint64_t released_earlier = 0;  // releases before next_number last wrapped around to 0
   std::uint64_t skipped = 0;

@@ -70,6 +70,7 @@ class Lifecycle final : public Scheduler {
 
   using Scheduler::release;
   void release(TaskId task, Time nominal, Time now, Time origin) override;
+  void receive(TaskId task, TaskId sender, Time at, Time now, Time origin) override;
   void miss(TaskId task, Time nominal, Time now, Reason reason) override;
   void complete(JobSlot job, Time now, Outcome outcome) override;
   void preemption_point(JobSlot job, Time now) override;
@@ -84,6 +85,7 @@ class Lifecycle final : public Scheduler {
   DagId add_dag(const Dag &dag, Time now) override;
   void remove_dag(DagId dag, Time now) override;
   TaskId add_task(DagId dag, std::uint32_t rank, const Task &task, Time now) override;
+  void set_predecessors(TaskId task, std::span<const TaskId> predecessors, Time now) override;
   void remove_task(TaskId task, Time now) override;
   void set_timing(TaskId task, Duration period, Duration deadline, Time now) override;
   void close(Time now) override;
@@ -121,6 +123,7 @@ class Lifecycle final : public Scheduler {
   [[gnu::always_inline]] inline void admit(TaskId id, Time nominal, Time origin);
   void admit_or_refuse(TaskId id, Time nominal, Time origin);
   void refuse(TaskId id, Time nominal, Reason reason);
+  inline void use_data(TaskId id);
   static std::uint32_t count_release(TaskState &task);
   [[nodiscard]] Time turn_of(const TaskState &task, Time origin) const;
   inline void make_ready(std::uint32_t slot, Time origin);

@@ -15,7 +15,8 @@ namespace redag::sched {
 // Returns true if both tasks are on one grid: same period and offset, joined by edges. Job k of one can then wait,
 // directly or through other tasks, for job k of the other.
 [[nodiscard]] inline bool shares_grid(const TaskState &a, const TaskState &b) {
-  return a.joined && b.joined && b.timer && b.life == TaskLife::Live && a.period == b.period && a.offset == b.offset;
+  const bool have_grids = a.on_grid && b.on_grid && b.timer;
+  return have_grids && a.joined && b.joined && b.life == TaskLife::Live && a.period == b.period && a.offset == b.offset;
 }
 
 template <Dispatcher D>

@@ -22,6 +22,16 @@ void Lifecycle<D>::release(TaskId task, Time nominal, Time now, Time origin) {
 }
 
 template <Dispatcher D>
+void Lifecycle<D>::receive(TaskId task, TaskId sender, Time at, Time now, Time origin) {
+  REDAG_CHECK(task.value < table_.tasks.size(), "a message for a task that does not exist");
+  REDAG_CHECK(!table_.tasks[task.value].timer && !table_.tasks[task.value].on_grid,
+              "only data tasks that were added alone have messages");
+  table_.step.begin(now);
+  if (takes_releases(table_.tasks[task.value]) && table_.precedence.on_message(task, sender, at, origin))
+    use_data(task);
+}
+
+template <Dispatcher D>
 void Lifecycle<D>::admit_or_refuse(TaskId id, Time nominal, Time origin) {
   if (closed_) return;
   const Reason reason = refusal(table_.tasks[id.value], nominal);
@@ -81,17 +91,21 @@ void Lifecycle<D>::complete(JobSlot job_slot, Time now, Outcome outcome) {
   table_.free_slot(slot);
   if (outcome != Outcome::Finished || !task.joined || !takes_releases(task)) return;
 
-  table_.precedence.on_complete(id, release, origin, now, [&](TaskId successor) {
-    const TaskState &next = table_.tasks[successor.value];
-    if (next.life != TaskLife::Live) return;
-    if (!next.timer) {
-      const Precedence::Data data = table_.precedence.consume(successor);
-      restricted_ ? admit_or_refuse(successor, data.complete, data.origin)
-                  : admit(successor, data.complete, data.origin);
-    } else if (next.waiting != kNil) {
-      make_ready(next.waiting, table_.precedence.consume(successor).origin);
-    }
-  });
+  table_.precedence.on_complete(id, release, origin, now, [this](TaskId successor) { use_data(successor); });
+}
+
+// All data of the task is fresh: releases its job, or makes the one that waits for the data ready.
+template <Dispatcher D>
+void Lifecycle<D>::use_data(TaskId id) {
+  const TaskState &task = table_.tasks[id.value];
+  if (task.life != TaskLife::Live) return;
+  if (!task.timer) {
+    const Precedence::Data data = table_.precedence.consume(id);
+    restricted_ ? admit_or_refuse(id, data.complete, data.origin) : admit(id, data.complete, data.origin);
+  } else if (task.waiting != kNil) {
+    const bool has_data = table_.precedence.has_predecessors(id);
+    make_ready(task.waiting, has_data ? table_.precedence.consume(id).origin : table_.jobs[task.waiting].release);
+  }
 }
 
 template <Dispatcher D>
@@ -322,13 +336,27 @@ template <Dispatcher D>
 TaskId Lifecycle<D>::add_task(DagId dag, std::uint32_t rank, const Task &task, Time now) {
   REDAG_CHECK(dag.value < table_.dags.size() && !table_.dags[dag.value].removed,
               "a task for a DAG that does not exist");
-  REDAG_CHECK(task.activation == Activation::Timer && task.predecessors.empty(),
-              "a task that is added alone has no predecessors");
+  REDAG_CHECK(task.predecessors.empty(), "a task that is added alone has no predecessors");
   table_.step.begin(now);
   table_.collect();
   const TaskId id = table_.append_task(dag, rank, task);
   reprioritise();
   return id;
+}
+
+template <Dispatcher D>
+void Lifecycle<D>::set_predecessors(TaskId id, std::span<const TaskId> predecessors, Time now) {
+  REDAG_CHECK(id.value < table_.tasks.size() && !table_.tasks[id.value].on_grid,
+              "new predecessors of a task that was not added alone");
+  table_.step.begin(now);
+  for (const TaskId from : predecessors) {
+    REDAG_CHECK(from != id && from.value < table_.tasks.size() && !table_.tasks[from.value].on_grid,
+                "a predecessor that was not added alone");
+    table_.tasks[from.value].joined = table_.tasks[id.value].joined = true;
+  }
+  const bool complete = table_.precedence.set_predecessors(id, predecessors);
+  find_heirs();
+  if (complete && takes_releases(table_.tasks[id.value])) use_data(id);
 }
 
 template <Dispatcher D>

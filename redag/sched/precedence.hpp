@@ -19,8 +19,12 @@ class Precedence {
  public:
   /// Adds a DAG's tasks and edges. `ids` are the tasks' ids in their order, each new or forgotten. Allocates.
   void add_dag(const Dag &dag, std::span<const TaskId> ids);
-  /// Adds a task without edges. Allocates.
-  void add_task(const Task &task, TaskId id) { add_node(task, id); }
+  /// Adds a task whose releases come from outside: it has no grid, and no edge of it is aligned. A data task gets an
+  /// edge for its messages. Allocates.
+  void add_task(const Task &task, TaskId id);
+  /// Replaces the predecessors of a task that add_task() added. Edges that stay keep their data. Returns true if all
+  /// data of its last job is fresh now, or of its next one for a data task. Linear in all edges.
+  bool set_predecessors(TaskId task, std::span<const TaskId> predecessors);
   /// Removes tasks with their incoming and outgoing edges. Their ids can be added again. Linear in all edges.
   void forget(std::span<const TaskId> tasks);
   /// Changes a task's period and finds again which edges are aligned. Data that has arrived keeps its state. Linear in
@@ -29,6 +33,12 @@ class Precedence {
 
   /// Records a new job of `task`, released at `release`. Returns true if all its predecessors have fresh data.
   bool on_release(TaskId task, Time release);
+
+  /// Records that a message for data task `task` came at `at`, with data from `origin`. If a job of `sender` is sending
+  /// it, earlier data of that predecessor no longer serves: the message waits for the end of its own sender. Returns
+  /// true if all data is fresh now. A message from before the data that was consumed last changes nothing, because a
+  /// job has used it or one that came later.
+  bool on_message(TaskId task, TaskId sender, Time at, Time origin);
 
   struct Data {
     Time origin = 0;    // the earliest origin of the data
@@ -44,6 +54,7 @@ class Precedence {
       data.complete = std::max(data.complete, edges_[i].finish);
     }
     node.fresh = 0;
+    node.consumed = data.complete;
     return data;
   }
 
@@ -100,6 +111,7 @@ class Precedence {
  private:
   struct Edge {
     TaskId to;                                        // the successor; invalid: the edge is forgotten
+    TaskId from;                                      // the predecessor; invalid: messages of `to`
     bool aligned = false;                             // timer to timer, same period and offset: job k waits for job k
     bool fresh = false;                               // the predecessor completed since `to` last consumed
     Time release = std::numeric_limits<Time>::min();  // of the predecessor's newest completed job: its data
@@ -121,10 +133,12 @@ class Precedence {
     std::uint32_t last_successor = 0;
     std::uint32_t fresh = 0;  // number of incoming edges with fresh data for its last job
     TaskId heir;
-    Time last_release = 0;  // of that job
+    Time last_release = 0;                             // of that job
+    Time consumed = std::numeric_limits<Time>::min();  // Data::complete of what was consumed last
     Duration period = 0;
     Duration offset = 0;
     bool timer = true;
+    bool on_grid = true;          // its releases are points of its grid
     std::uint32_t heir_edge = 0;  // from the task to its heir
   };
 
@@ -134,6 +148,7 @@ class Precedence {
   }
   [[nodiscard]] bool count_fresh(Node &node);
   Node &add_node(const Task &task, TaskId id);
+  void store(const std::vector<std::vector<Edge>> &incoming);
   [[nodiscard]] static bool is_aligned(const Node &from, const Node &to);
 
   std::vector<Node> nodes_;  // by TaskId

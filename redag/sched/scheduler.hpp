@@ -104,6 +104,11 @@ class Scheduler {
   virtual void release(TaskId task, Time nominal, Time now, Time origin) = 0;
   void release(TaskId task, Time nominal, Time now) { release(task, nominal, now, nominal); }
 
+  /// Reports that a message for data task `task`, which add_task() added, came at `at`, with data from `origin`. It is
+  /// one more predecessor: the job is released when all of them have completed. `sender`: the task whose job is sending
+  /// it; its earlier end does not count. Not valid: nobody knows.
+  virtual void receive(TaskId task, TaskId sender, Time at, Time now, Time origin);
+
   /// Reports a release of timer task `task` that is skipped at once for `reason`: a period that the timer missed, or a
   /// message that the middleware overwrote. The task's other jobs are not affected. If the scheduler would refuse the
   /// release anyway (budget, HI mode), it records that reason instead.
@@ -154,9 +159,11 @@ class Scheduler {
   virtual DagId add_dag(const Dag &dag, Time now) = 0;
   /// Removes a DAG: skips jobs that have not started. Started jobs end as usual.
   virtual void remove_dag(DagId dag, Time now) = 0;
-  /// Adds a timer task without predecessors to a DAG. It is released from outside. `rank` is its topological rank in
-  /// the DAG: ties of the policy are broken by DAG, rank and TaskId.
+  /// Adds a task without predecessors to a DAG. A timer task is released from outside, a data task by its messages.
+  /// `rank` is its topological rank in the DAG: ties of the policy are broken by DAG, rank and TaskId.
   virtual TaskId add_task(DagId dag, std::uint32_t rank, const Task &task, Time now) = 0;
+  /// Replaces the predecessors of a task that add_task() added by others of its DAG. No edge of it is aligned.
+  virtual void set_predecessors(TaskId task, std::span<const TaskId> predecessors, Time now);
   /// As remove_dag(), for one task. Its successors get no more data from it.
   virtual void remove_task(TaskId task, Time now) = 0;
   /// Sets a new period and deadline for jobs released from now on. The order of tasks changes at once. Successors keep
@@ -181,6 +188,14 @@ class Scheduler {
   /// How often a job found a worker and only Config::max_started kept it from starting.
   [[nodiscard]] virtual std::uint64_t thread_waits() const { return 0; }
 };
+
+inline void Scheduler::receive(TaskId /*task*/, TaskId /*sender*/, Time /*at*/, Time /*now*/, Time /*origin*/) {
+  REDAG_CHECK(false, "a message, which this scheduler does not know");
+}
+
+inline void Scheduler::set_predecessors(TaskId /*task*/, std::span<const TaskId> /*predecessors*/, Time /*now*/) {
+  REDAG_CHECK(false, "new predecessors, which this scheduler does not know");
+}
 
 inline void Scheduler::wait(JobSlot /*job*/, DeviceId /*device*/, Time /*now*/) {
   REDAG_CHECK(false, "a job waits, which this scheduler does not know");

@@ -148,6 +148,26 @@ std::vector<Removal> removals_from(const Json &json, std::size_t task_count) {
   return removals;
 }
 
+std::vector<Edge> edges_from(const Json &json, std::size_t task_count) {
+  std::vector<Edge> edges;
+  const auto rows = json.find("edges");
+  if (rows == json.end()) return edges;
+  if (!rows->is_array()) throw BadValue("'edges' must be a list");
+  const auto task_of = [&](const Json &row, const char *key) {
+    const std::int64_t task = integer_of(row, key, 0, std::numeric_limits<std::uint32_t>::max());
+    if (static_cast<std::size_t>(task) >= task_count)
+      throw BadValue("'edges' must name positions of tasks in the workload");
+    return TaskId(static_cast<std::size_t>(task));
+  };
+  for (const Json &row : *rows) {
+    Edge edge{.from = task_of(row, "from"), .to = task_of(row, "to")};
+    edge.since = integer_of(row, "since_ns", -kMaxTraceTime, kMaxTraceTime);
+    if (row.contains("until_ns")) edge.until = integer_of(row, "until_ns", -kMaxTraceTime, kMaxTraceTime);
+    edges.push_back(edge);
+  }
+  return edges;
+}
+
 // Files of earlier versions state events by `event_tasks` alone, as timers.
 void mark_events(RunInfo &info) {
   std::vector<Task *> tasks;
@@ -218,6 +238,10 @@ std::string run_info_to_json(const RunInfo &info) {
   for (const Removal &removal : info.removals) {
     json["removals"].push_back({{"task", removal.task.value}, {"at_ns", removal.at}});
   }
+  for (const Edge &edge : info.edges) {
+    json["edges"].push_back({{"from", edge.from.value}, {"to", edge.to.value}, {"since_ns", edge.since}});
+    if (edge.until != kNever) json["edges"].back()["until_ns"] = edge.until;
+  }
   if (info.origin) json["origin_ns"] = *info.origin;
   if (info.settled) json["settled_ns"] = *info.settled;
   // Texts from outside may not be UTF-8; a replaced character is better than no file.
@@ -238,6 +262,7 @@ Result<RunInfo> run_info_from_json(std::string_view text, const std::string &fil
     info.workload = std::move(loaded->workload);
     info.event_tasks = event_tasks_from(json, info.workload.task_count());
     info.removals = removals_from(json, info.workload.task_count());
+    info.edges = edges_from(json, info.workload.task_count());
     mark_events(info);
     return info;
   } catch (const BadValue &error) {

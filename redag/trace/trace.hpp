@@ -57,6 +57,16 @@ struct Removal {
   friend bool operator==(const Removal &, const Removal &) = default;
 };
 
+/// A predecessor of a ROS 2 callback that the executor had it wait for, from `since` to `until` (kNever: to the end).
+struct Edge {
+  TaskId from;
+  TaskId to;
+  Time since = 0;
+  Time until = kNever;
+
+  friend bool operator==(const Edge &, const Edge &) = default;
+};
+
 struct RunInfo {
   Workload workload;           // task ids of the events are indices in it
   std::string executor;        // "redag", "mte", "ste", ...
@@ -76,6 +86,7 @@ struct RunInfo {
   std::vector<Remark> remarks;
   std::vector<TaskId> event_tasks;  // timer tasks that the program releases: no grid, at least a period apart
   std::vector<Removal> removals;
+  std::vector<Edge> edges;     // of callbacks; `workload` has the edges of all other tasks
   std::optional<Time> origin;  // on threads: CLOCK_MONOTONIC at time 0
   // When rates, deadlines or levels last changed: `workload` says what held from then on. Earlier events are not held
   // to rules that follow from these.
