@@ -52,6 +52,13 @@ ReleaseRules::ReleaseRules(CheckContext &context) : context_(context) {
     }
     first += dag.tasks.size();
   }
+  for (const trace::Edge &edge : context.info.edges) {
+    const auto link = static_cast<std::uint32_t>(links_.size());
+    tasks_[edge.to.value].links_in.push_back(link);
+    tasks_[edge.from.value].links_out.push_back(link);
+    const std::optional<Callback> &callback = context.replay.task(edge.to).callback;
+    links_.push_back({.edge = edge, .gives_back = callback && callback->kind == Callback::Kind::Timer});
+  }
   for (const TaskId task : context.info.event_tasks) tasks_[task.value].on_grid = false;
 }
 
@@ -231,6 +238,7 @@ void ReleaseRules::ready(const JobEvent &event, const LiveJob &job) {
   });
   context_.expect(Rule::Admission, !refused, event.task, event.job,
                   [] { return std::string("it became ready although it had to be skipped"); });
+  follow_links(event);
   Time origin = job.release;
   if (!task.timer) {
     origin = task.data_origin;
@@ -242,10 +250,24 @@ void ReleaseRules::ready(const JobEvent &event, const LiveJob &job) {
     });
     origin = consume(task);
   }
-  // Of a ROS 2 callback, this process knows when the data began its way, and the trace has no edges.
+  // Of a ROS 2 callback, this process knows when the data began its way.
   const bool may_be_older = task.timer && task.in.empty() && context_.replay.task(event.task).callback.has_value();
-  context_.expect(Rule::Precedence, may_be_older ? event.value <= origin : event.value == origin, event.task, event.job,
+  const bool as_expected = may_be_older ? event.value <= origin : event.value == origin;
+  context_.expect(Rule::Precedence, as_expected || !task.links_in.empty(), event.task, event.job,
                   [&] { return expected_and_got("its origin", origin, event.value); });
+}
+
+// A callback's job becomes ready: its predecessors must have completed since the last one did.
+void ReleaseRules::follow_links(const JobEvent &event) {
+  for (const std::uint32_t index : tasks_[event.task.value].links_in) {
+    Link &link = links_[index];
+    const bool holds = link.edge.since <= event.time && event.time < link.edge.until;
+    context_.expect(Rule::Precedence, link.fresh || !holds, event.task, event.job, [&] {
+      return "it became ready although " + trace::task_name(context_.info.workload, link.edge.from) +
+             " has not completed since its last job became ready";
+    });
+    link.fresh = false;
+  }
 }
 
 // True for a release that the driver skips itself, regardless of the task's other jobs. The reason is `overrun` for a
@@ -267,6 +289,7 @@ void ReleaseRules::skipped(const JobEvent &event, const LiveJob *job) {
   if (job != nullptr && job->state == LiveJob::State::Ready && task.timer) {
     // No job used its data.
     for (const std::uint32_t edge : task.in) edges_[edge].fresh = true;
+    for (const std::uint32_t link : task.links_in) links_[link].fresh = links_[link].fresh || links_[link].gives_back;
     touch(event.task);
   }
   if (event.reason == Reason::Removed) return;
@@ -299,6 +322,7 @@ void ReleaseRules::finished(const JobEvent &event, const LiveJob &job) {
     edge.finish_decided = event.time;
     touch(edge.to);
   }
+  for (const std::uint32_t link : tasks_[event.task.value].links_out) links_[link].fresh = true;
 }
 
 void ReleaseRules::end_of_instant() {
@@ -324,7 +348,7 @@ void ReleaseRules::check_nothing_is_owed(TaskId id) {
     if (owed) consume(task);
   }
   for (const LiveJob &job : context_.replay.jobs_of(id)) {
-    if (job.state != LiveJob::State::Waiting) continue;
+    if (job.state != LiveJob::State::Waiting || !task.links_in.empty()) continue;
     const bool owed = !task.timer || !missing(task, job.release).valid();
     context_.expect(Rule::Precedence, !owed, id, job.number,
                     [] { return std::string("it did not become ready although every predecessor has fresh data"); });

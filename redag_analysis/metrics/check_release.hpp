@@ -33,6 +33,13 @@ class ReleaseRules {
     Time finish = 0;                                  // of the job that completed last, as measured
     Time finish_decided = 0;                          // when the scheduler learned of it
   };
+  // An edge between callbacks (trace::Edge). The trace does not say when messages come, so a job can begin later than
+  // its predecessors allow, but never earlier.
+  struct Link {
+    trace::Edge edge;
+    bool gives_back = false;  // `to` is a timer: a job skipped while it is ready has not used the data
+    bool fresh = false;
+  };
   // State of the task's releases that are refused (docs/model.md, "Budgets" and "Criticality").
   struct Refusals {
     bool skips_next = false;
@@ -46,6 +53,8 @@ class ReleaseRules {
     std::uint32_t queue_depth = 0;
     std::vector<std::uint32_t> in;   // edges
     std::vector<std::uint32_t> out;  // edges
+    std::vector<std::uint32_t> links_in;
+    std::vector<std::uint32_t> links_out;
     std::uint32_t next_number = 0;
     Time data_origin = 0;  // of the data job that was released last
     bool touched = false;
@@ -67,6 +76,7 @@ class ReleaseRules {
   void mode_begins();
   void mode_ends();
   void ready(const JobEvent &event, const LiveJob &job);
+  void follow_links(const JobEvent &event);
   void skipped(const JobEvent &event, const LiveJob *job);
   bool is_miss(const JobEvent &event) const;
   void finished(const JobEvent &event, const LiveJob &job);
@@ -82,6 +92,7 @@ class ReleaseRules {
 
   CheckContext &context_;
   std::vector<Edge> edges_;
+  std::vector<Link> links_;
   std::vector<TaskState> tasks_;
   [[nodiscard]] bool is_removed(TaskId task) const {
     const std::size_t dag = context_.replay.dag_of(task).value;

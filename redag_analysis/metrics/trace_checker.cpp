@@ -183,6 +183,13 @@ class TraceChecker::Impl {
       for (const TaskId task : run.event_tasks) {
         if (places_[task.value].part == p) info.event_tasks.push_back(places_[task.value].task);
       }
+      info.edges.clear();
+      for (trace::Edge edge : run.edges) {
+        if (places_[edge.from.value].part != p || places_[edge.to.value].part != p) continue;
+        edge.from = places_[edge.from.value].task;
+        edge.to = places_[edge.to.value].task;
+        info.edges.push_back(edge);
+      }
       checkers_.emplace_back(std::move(info), parts_[p], rules, report_);
     }
   }
