@@ -70,7 +70,9 @@ void ArrivalCallback::arrived(std::size_t count, Source source, int part, bool s
     for (std::size_t i = 0; i < count; ++i) {
       if (depth_ > 0 && kept_[index_of(source)] >= depth_) {
         const Overwritten whose = drop_oldest(source);
-        if (whose == Overwritten::Released && direct && !replaces && releases_.none()) {
+        if (joined_) {
+          // The scheduler has heard of the message; a later one replaces it, as later data of a predecessor does.
+        } else if (whose == Overwritten::Released && direct && !replaces && releases_.none()) {
           // The released job's message is gone. Its release is replaced by one for the next message. A release that is
           // still in progress could come after the one that replaces it, and stands for the next message instead.
           replaces = true;
@@ -92,14 +94,14 @@ void ArrivalCallback::arrived(std::size_t count, Source source, int part, bool s
       begin_release_of_first(release);
     } else {
       const bool noted = noted_;
-      begins = begin_release(release);
+      begins = joined_ ? begin_receive(release) : begin_release(release);
       if (noted_ && !noted) to_wake = context();
       if (overwritten > 0 && !begins) releases_.begin();
     }
   }
   const bool uses_engine = begins || overwritten > 0;
   for (; overwritten > 0; --overwritten) engine().miss(task(), now, redag::Reason::QueueFull);
-  if (begins) engine().release(release, now);
+  if (begins) tell(release, now);
   if (uses_engine) end_release();
   if (to_wake) to_wake->wake();
   if (to_adopt) to_adopt->rate_seen();
@@ -128,16 +130,32 @@ ArrivalCallback::Overwritten ArrivalCallback::drop_oldest(Source source) {
 // left lock_. Without a job of the task that is in progress, only releases_ keeps the engine, and the task's id its
 // own.
 bool ArrivalCallback::begin_release(Release &release) {
-  if (released_ > 0 || !context() || tokens_.empty()) return false;
-  if (!context()->direct()) {
-    if (!noted_) {
-      noted_ = true;
-      context()->note(shared_from_this());
-    }
-    return false;
-  }
+  if (joined_ || released_ > 0 || !context() || tokens_.empty() || !is_direct()) return false;
   begin_release_of_first(release);
   return true;
+}
+
+// As begin_release(), for the newest token of a joined callback.
+bool ArrivalCallback::begin_receive(Release &message) {
+  if (!context() || tokens_.empty() || !is_direct()) return false;
+  const Token &newest = tokens_.at(tokens_.size() - 1);
+  message = {task(), newest.arrival, newest.origin};
+  releases_.begin();
+  return true;
+}
+
+// False: the callback is noted, and admit() will release what has arrived.
+bool ArrivalCallback::is_direct() {
+  if (context()->direct()) return true;
+  if (!noted_) {
+    noted_ = true;
+    context()->note(shared_from_this());
+  }
+  return false;
+}
+
+void ArrivalCallback::tell(const Release &release, Time now) {
+  joined_ ? engine().receive(release, now) : engine().release(release, now);
 }
 
 void ArrivalCallback::begin_release_of_first(Release &release) {
@@ -165,9 +183,15 @@ void ArrivalCallback::admit() {
     const redag::LockGuard guard(lock_);
     noted_ = false;
     if (!context() || released_ > 0 || tokens_.empty()) return;
-    begin_release_of_first(release);
+    if (joined_) {
+      const Token &newest = tokens_.at(tokens_.size() - 1);
+      release = {task(), newest.arrival, newest.origin};
+      releases_.begin();
+    } else {
+      begin_release_of_first(release);
+    }
   }
-  engine().release(release, engine().now());
+  tell(release, engine().now());
   end_release();
 }
 
@@ -180,7 +204,8 @@ void ArrivalCallback::skipped(redag::Reason reason) noexcept {
   Release release;
   {
     const redag::LockGuard guard(lock_);
-    if (!context()) return;
+    // The messages of a joined callback's skipped job stay until its next job takes a later one.
+    if (!context() || joined_) return;
     // Reason::Overrun means that arrived() has replaced this job. The token now belongs to the new job.
     if (released_ == 1 && reason != redag::Reason::Overrun && !tokens_.empty()) {
       const Token &token = tokens_.front();
@@ -218,6 +243,23 @@ bool ArrivalCallback::take_token(Token &token) {
     engine().release(next, engine().now());
     end_release();
   }
+  return true;
+}
+
+// The newest token that had come when the job was released. Its message may have been overwritten since: then the first
+// one after it.
+bool ArrivalCallback::take_token_of(Time release, Token &token) {
+  const redag::LockGuard guard(lock_);
+  if (tokens_.empty()) return false;
+  while (tokens_.size() > 1 && tokens_.at(1).arrival <= release) {
+    const Token &older = tokens_.front();
+    ++dropped_[index_of(older.source)];
+    tokens_.pop();
+  }
+  token = tokens_.pop();
+  const std::size_t at = index_of(token.source);
+  dropping_[at] += std::exchange(dropped_[at], 0);
+  token.after_skipped = dropping_[at] > 0;
   return true;
 }
 
@@ -337,9 +379,10 @@ void ArrivalCallback::Taking::count(bool taken) {
   if (taken) callback_.taken_.fetch_add(1, std::memory_order_relaxed);
 }
 
-bool ArrivalCallback::run() {
+bool ArrivalCallback::run(Time release) {
   Token token;
-  return take_token(token) && execute_token(token);
+  const bool found = joined_ ? take_token_of(release, token) : take_token(token);
+  return found && execute_token(token);
 }
 
 bool ArrivalCallback::execute_token(const Token &token) {

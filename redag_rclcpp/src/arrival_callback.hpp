@@ -5,7 +5,12 @@
 // token at a time is a released job that waits in the scheduler; the others wait here, and cost the scheduler nothing.
 // When the job starts, the next token is released. If the scheduler skips a job, its message is dropped unread. Inputs
 // that later ones do not replace (requests, responses) keep their tokens, which are released again until they are
-// taken. Threads: the middleware's threads and publishing threads call the hooks, with their own locks held. An arrival
+// taken.
+//
+// A joined callback also waits for other callbacks. Then the scheduler releases the job once all of them have completed
+// and a message is there, and the job takes the newest message that was there at its release. Older ones are dropped.
+//
+// Threads: the middleware's threads and publishing threads call the hooks, with their own locks held. An arrival
 // and a job each take lock_ once, and the engine's lock once. Lock order: the callers' locks, lock_, the timer queue's,
 // the engine's.
 #pragma once
@@ -85,6 +90,10 @@ class ArrivalCallback : public Callback, public Hooked {
     return std::static_pointer_cast<ArrivalCallback>(shared_from_this());
   }
   void arrived(std::size_t count, Source source, int part, bool seen_only = false);
+  [[nodiscard]] redag::Activation join() override {
+    joined_ = true;
+    return redag::Activation::Data;
+  }
   /// Between these two calls no jobs are released: a job of another callback, which holds this one's group, calls
   /// handle_next(). For callbacks that drop no messages.
   void hold_releases() REDAG_EXCLUDES(lock_);
@@ -129,7 +138,7 @@ class ArrivalCallback : public Callback, public Hooked {
   static std::size_t index_of(Source source) { return static_cast<std::size_t>(source); }
 
   bool connect() override;
-  [[nodiscard]] bool run() override;
+  [[nodiscard]] bool run(Time release) override;
   [[nodiscard]] bool execute_token(const Token &token);
   enum class Overwritten : std::uint8_t {
     Skipped,   // its job was skipped and counted before
@@ -142,13 +151,18 @@ class ArrivalCallback : public Callback, public Hooked {
   [[nodiscard]] bool learn_from_arrival(Time now, std::size_t count, Source source,
                                         const redag::runtime::RunningJob *publisher) REDAG_REQUIRES(lock_);
   [[nodiscard]] bool take_token(Token &token);
+  [[nodiscard]] bool take_token_of(Time release, Token &token);
   [[nodiscard]] bool begin_release(redag::runtime::Release &release) REDAG_REQUIRES(lock_);
   void begin_release_of_first(redag::runtime::Release &release) REDAG_REQUIRES(lock_);
+  [[nodiscard]] bool begin_receive(redag::runtime::Release &message) REDAG_REQUIRES(lock_);
+  [[nodiscard]] bool is_direct() REDAG_REQUIRES(lock_);
+  void tell(const redag::runtime::Release &release, Time now);
   void end_release() REDAG_EXCLUDES(lock_);
   [[nodiscard]] bool begin_drop(Source source) REDAG_EXCLUDES(lock_);
   void forget_dropped(Source source) REDAG_EXCLUDES(lock_);
 
   bool takes_part_ = false;  // see take_part_in_exchange()
+  bool joined_ = false;      // see join()
   const std::size_t depth_;
   std::atomic<bool> by_wait_set_;  // a wait set watches the entity
 

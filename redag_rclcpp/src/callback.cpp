@@ -16,7 +16,7 @@ using redag::sched::Outcome;
 Outcome Callback::execute(const redag::runtime::Job &job) {
   redag::runtime::RunningJob &running = *redag::runtime::RunningJob::current();
   running.owner = this;
-  if (!run()) return Outcome::NoData;
+  if (!run(job.release)) return Outcome::NoData;
   if (running.waiting == nullptr) count_job(running, job.release);
   return Outcome::Finished;
 }

@@ -34,6 +34,11 @@ class Callback : public TimerQueue::Timer,
                  public redag::runtime::CoroutineOwner,
                  public std::enable_shared_from_this<Callback> {
  public:
+  /// True if its jobs can wait for other callbacks. False: somebody waits for an answer to each of its inputs.
+  [[nodiscard]] virtual bool can_join() const { return false; }
+  /// Called before attach() for a callback whose jobs do so. Returns what its task must be. Data: what arrives is one
+  /// of its predecessors.
+  [[nodiscard]] virtual redag::Activation join() { return redag::Activation::Timer; }
   /// Connects the entity: later arrivals are released as jobs of `task`. True if a wait set must watch it.
   bool attach(TaskId task) {
     task_ = task;
@@ -109,8 +114,8 @@ class Callback : public TimerQueue::Timer,
  private:
   /// See attach(); the task is set.
   virtual bool connect() = 0;
-  /// Runs the callback for one job. False: there was nothing to execute.
-  [[nodiscard]] virtual bool run() = 0;
+  /// Runs the callback for one job, released at `release`. False: there was nothing to execute.
+  [[nodiscard]] virtual bool run(Time release) = 0;
   /// Throws redag::WaitCancelled once detached.
   [[nodiscard]] std::shared_ptr<ExecutorContext> context_now() const REDAG_EXCLUDES(lock_);
   void count_job(redag::runtime::RunningJob &running, Time release);

@@ -377,6 +377,11 @@ std::vector<std::string> ReDAGExecutor::Core::errors() const {
 redag::trace::RunInfo ReDAGExecutor::Core::run_info(std::vector<std::uint32_t> &positions) const {
   redag::trace::RunInfo info;
   info.workload = tasks_.describe(positions);
+  info.edges = tasks_.edges();
+  for (redag::trace::Edge &edge : info.edges) {
+    edge.from = redag::TaskId(positions[edge.from.value]);
+    edge.to = redag::TaskId(positions[edge.to.value]);
+  }
   info.executor = "redag";
   info.config = engine_->options().config;
   info.preemption = to_string(setup_.mode.mode);

@@ -129,12 +129,21 @@ void Registry::collect() {
     if (present.count(key) == 0 || !callback->alive()) gone.push_back(callback);
   }
   for (const auto &callback : gone) remove(callback);
+  find_places(found);
   std::vector<std::shared_ptr<WaitSetMember>> added;
+  const auto add_one = [&](const Entity &entity, redag::CallbackId id) REDAG_REQUIRES(collect_lock_) {
+    add(entity, std::move(id));
+    added.push_back(callbacks_.at(entity.key));
+  };
   for (const Entity &entity : found) {
     if (callbacks_.count(entity.key) != 0 || is_called_by_owner(entity)) continue;
-    add(entity);
-    added.push_back(callbacks_.at(entity.key));
+    add_one(entity, id_of(entity, next_index_));
   }
+  for (const std::shared_ptr<Callback> &callback : still_plain()) {
+    const Entity &entity = *present.at(remove(callback));
+    add_one(entity, callback->id());
+  }
+  connect();
   if (!added.empty() && rclcpp::ok(context_)) find_leftovers(context_, added);
 }
 
@@ -210,21 +219,32 @@ void Registry::watch_group(rclcpp::CallbackGroup &group, const std::function<voi
   if (condition) condition->set_on_trigger_callback(callback);
 }
 
-void Registry::add(const Entity &found) {
-  TaskTable::Entry entry;
-  entry.id = found.id;
-  if (found.name_of) entry.id.name = found.name_of(*context_);
+redag::CallbackId Registry::id_of(const Entity &found, Counters &counters) const {
+  redag::CallbackId id = found.id;
+  if (found.name_of) id.name = found.name_of(*context_);
   // The timers of waitables are numbered on their own. Otherwise the numbers that a workload states would depend on the
   // distribution.
-  const int kind = found.owner == nullptr ? static_cast<int>(entry.id.kind) : -1;
-  if (entry.id.name.empty() || found.owner != nullptr) entry.id.index = next_index_[{entry.id.node, kind}]++;
+  const int kind = found.owner == nullptr ? static_cast<int>(id.kind) : -1;
+  if (id.name.empty() || found.owner != nullptr) id.index = counters[{id.node, kind}]++;
+  return id;
+}
+
+void Registry::add(const Entity &found, redag::CallbackId id) {
+  TaskTable::Entry entry;
+  entry.id = std::move(id);
   entry.in_default_group = found.in_default_group;
   place(entry, found);
+  const Place its_place{entry.dag, entry.position};
 
   const std::shared_ptr<Callback> callback = found.make(executor_.lock(), entry.id);
   entry.callback = callback;
   entry.entity = found.key;
   callback->set_deadline(entry.task.deadline);
+  // A timer waits for predecessors that come later, too. Other callbacks are then added anew: see still_plain().
+  const bool is_timer = entry.id.kind == redag::Callback::Kind::Timer;
+  const bool waits = entry.configured && callback->can_join() && (is_timer || has_predecessor(its_place));
+  if (waits) entry.task.activation = callback->join();
+  if (entry.configured) placed_.emplace(its_place, Placed{callback, waits});
 
   const redag::TaskId task = parts_.engine.add_task(
       dag_ids_[entry.dag], entry.rank, entry.task,
@@ -241,6 +261,7 @@ void Registry::place(TaskTable::Entry &entry, const Entity &found) {
   if (const auto ref = matcher_ ? matcher_->find(entry.id) : std::nullopt) {
     task = *ref->task;
     entry.dag = ref->dag.value;
+    entry.position = ref->index;
     entry.rank = redag::topological_ranks(options_.workload->dags[entry.dag])[ref->index];
     entry.configured = true;
   }
@@ -248,7 +269,7 @@ void Registry::place(TaskTable::Entry &entry, const Entity &found) {
   if (task.deadline == 0) task.deadline = task.period;
   task.period = std::min(task.period, redag::kMaxDuration);  // some timers mean "never"
   task.deadline = std::min(task.deadline, redag::kMaxDuration);
-  // ROS decides what releases the jobs, and which jobs must not overlap.
+  // ROS decides what releases the jobs, and which jobs must not overlap. connect() states the predecessors.
   task.activation = redag::Activation::Timer;
   task.predecessors.clear();
   task.offset = 0;
@@ -258,16 +279,88 @@ void Registry::place(TaskTable::Entry &entry, const Entity &found) {
   task.concurrency = task.group.empty() ? workers_ : 1;
 }
 
-void Registry::remove(const std::shared_ptr<Callback> &gone) {
+// Returns the key of its entity.
+const void *Registry::remove(const std::shared_ptr<Callback> &gone) {
   const std::shared_ptr<Callback> callback = gone;
+  const void *key = nullptr;
   const auto entry = std::find_if(callbacks_.begin(), callbacks_.end(), [&](auto &e) { return e.second == callback; });
-  if (entry != callbacks_.end()) callbacks_.erase(entry);
+  if (entry != callbacks_.end()) {
+    key = entry->first;
+    callbacks_.erase(entry);
+  }
+  std::erase_if(placed_, [&](const auto &placed) { return placed.second.callback == callback; });
   callback->detach();
   parts_.timer.settle();  // afterwards the id may be another task's
   parts_.bridge.remove(*callback);
   const redag::TaskId task = callback->task();
+  connect_to(task, {});
+  for (const auto &[successor, its] : std::map(predecessors_)) {
+    if (std::find(its.begin(), its.end(), task) == its.end()) continue;
+    std::vector<redag::TaskId> left = its;
+    std::erase(left, task);
+    connect_to(successor, std::move(left));
+  }
   parts_.tasks.drop(task);
   parts_.engine.remove_task(task);
+  return key;
+}
+
+// ---- precedence ----
+
+// Finds the tasks of the workload that have a callback, or will have one after this collect().
+void Registry::find_places(const std::vector<Entity> &found) {
+  places_.clear();
+  if (!matcher_) return;
+  for (const auto &[place, placed] : placed_) places_.insert(place);
+  Counters counters = next_index_;
+  for (const Entity &entity : found) {
+    if (callbacks_.count(entity.key) != 0 || entity.owner != nullptr) continue;
+    if (const auto ref = matcher_->find(id_of(entity, counters))) places_.emplace(ref->dag.value, ref->index);
+  }
+}
+
+const std::vector<std::uint32_t> &Registry::predecessors_of(Place place) const {
+  return options_.workload->dags[place.first].tasks[place.second].predecessors;
+}
+
+bool Registry::has_predecessor(Place place) const {
+  const std::vector<std::uint32_t> &predecessors = predecessors_of(place);
+  return std::any_of(predecessors.begin(), predecessors.end(), [&](std::uint32_t p) REDAG_REQUIRES(collect_lock_) {
+    return places_.count({place.first, p}) > 0;
+  });
+}
+
+// Returns the callbacks that were added before any of their predecessors, and that could wait for one now.
+std::vector<std::shared_ptr<Callback>> Registry::still_plain() const {
+  std::vector<std::shared_ptr<Callback>> plain;
+  for (const auto &[place, placed] : placed_) {
+    if (!placed.waits && has_predecessor(place) && placed.callback->can_join()) plain.push_back(placed.callback);
+  }
+  return plain;
+}
+
+// Tells the engine which callbacks each callback waits for: those of its predecessors in the workload that are present.
+void Registry::connect() {
+  for (const auto &[place, placed] : placed_) {
+    if (!placed.waits) continue;
+    std::vector<redag::TaskId> predecessors;
+    for (const std::uint32_t p : predecessors_of(place)) {
+      const auto [first, last] = placed_.equal_range({place.first, p});
+      for (auto it = first; it != last; ++it) predecessors.push_back(it->second.callback->task());
+    }
+    connect_to(placed.callback->task(), std::move(predecessors));
+  }
+}
+
+void Registry::connect_to(redag::TaskId task, std::vector<redag::TaskId> predecessors) {
+  std::vector<redag::TaskId> &known = predecessors_[task];
+  if (known != predecessors) {
+    const Time before = parts_.engine.now();
+    parts_.engine.set_predecessors(task, predecessors);
+    parts_.tasks.set_predecessors(task, predecessors, before, parts_.engine.now());
+    known = std::move(predecessors);
+  }
+  if (known.empty()) predecessors_.erase(task);
 }
 
 // ---- rates and names ----

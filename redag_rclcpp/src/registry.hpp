@@ -12,6 +12,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -76,8 +77,24 @@ class Registry {
 
  private:
   void forget_gone_nodes() REDAG_REQUIRES(collect_lock_);
-  void add(const Entity &found) REDAG_REQUIRES(collect_lock_);
-  void remove(const std::shared_ptr<Callback> &callback) REDAG_REQUIRES(collect_lock_);
+  /// Next index of a nameless entity, by node and kind; -1: timers of waitables.
+  using Counters = std::map<std::pair<std::string, int>, std::uint32_t>;
+  /// A task of the workload: its DAG, and its position there.
+  using Place = std::pair<std::uint32_t, std::uint32_t>;
+  struct Placed {
+    std::shared_ptr<Callback> callback;
+    bool waits = false;  // for the predecessors that are present
+  };
+
+  [[nodiscard]] redag::CallbackId id_of(const Entity &found, Counters &counters) const;
+  void add(const Entity &found, redag::CallbackId id) REDAG_REQUIRES(collect_lock_);
+  void find_places(const std::vector<Entity> &found) REDAG_REQUIRES(collect_lock_);
+  [[nodiscard]] const std::vector<std::uint32_t> &predecessors_of(Place place) const;
+  [[nodiscard]] bool has_predecessor(Place place) const REDAG_REQUIRES(collect_lock_);
+  [[nodiscard]] std::vector<std::shared_ptr<Callback>> still_plain() const REDAG_REQUIRES(collect_lock_);
+  void connect() REDAG_REQUIRES(collect_lock_);
+  void connect_to(redag::TaskId task, std::vector<redag::TaskId> predecessors) REDAG_REQUIRES(collect_lock_);
+  const void *remove(const std::shared_ptr<Callback> &callback) REDAG_REQUIRES(collect_lock_);
   void place(TaskTable::Entry &entry, const Entity &found) REDAG_REQUIRES(collect_lock_);
   void watch_group(rclcpp::CallbackGroup &group, const std::function<void(std::size_t)> &callback);
   [[nodiscard]] std::function<void(std::size_t)> entities_changed() const;
@@ -101,10 +118,12 @@ class Registry {
   std::unique_ptr<redag::CallbackMatcher> matcher_ REDAG_PT_GUARDED_BY(collect_lock_);  // null: no workload
   std::vector<NodeBase::WeakPtr> nodes_ REDAG_GUARDED_BY(collect_lock_);
   std::map<const void *, std::shared_ptr<Callback>> callbacks_ REDAG_GUARDED_BY(collect_lock_);  // by entity
+  std::multimap<Place, Placed> placed_ REDAG_GUARDED_BY(collect_lock_);  // callbacks that the workload names
+  std::set<Place> places_ REDAG_GUARDED_BY(collect_lock_);               // theirs, also of callbacks yet to be added
+  std::map<redag::TaskId, std::vector<redag::TaskId>> predecessors_ REDAG_GUARDED_BY(collect_lock_);  // the engine's
   ByGroup<std::string> group_names_ REDAG_GUARDED_BY(collect_lock_);
   ByGroup<NodeBase::WeakPtr> manual_groups_ REDAG_GUARDED_BY(collect_lock_);
-  // Next index of a nameless entity, by node and kind; -1: timers of waitables.
-  std::map<std::pair<std::string, int>, std::uint32_t> next_index_ REDAG_GUARDED_BY(collect_lock_);
+  Counters next_index_ REDAG_GUARDED_BY(collect_lock_);
   std::uint64_t next_group_ REDAG_GUARDED_BY(collect_lock_) = 0;
   bool closed_ REDAG_GUARDED_BY(collect_lock_) = false;
 };

@@ -125,6 +125,7 @@ class SubscriptionCallback final : public ArrivalCallback {
   [[nodiscard]] bool handle_from_middleware(rclcpp::SubscriptionBase &subscription, Taking &taking);
   // Later messages replace earlier ones.
   [[nodiscard]] bool drops_skipped() const override { return alive(); }
+  [[nodiscard]] bool can_join() const override { return true; }
   void drop_skipped(Source source) override;
 
   const std::weak_ptr<rclcpp::SubscriptionBase> subscription_;

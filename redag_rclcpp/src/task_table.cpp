@@ -79,6 +79,22 @@ void TaskTable::set(TaskId task, Entry entry) {
   entries_[task.value] = std::move(entry);
 }
 
+void TaskTable::set_predecessors(TaskId task, const std::vector<TaskId> &predecessors, redag::Time before,
+                                 redag::Time at) {
+  const redag::LockGuard guard(lock_);
+  std::set<TaskId> added(predecessors.begin(), predecessors.end());
+  for (redag::trace::Edge &edge : edges_) {
+    if (edge.to != task || edge.until != redag::kNever) continue;
+    if (added.erase(edge.from) == 0) edge.until = before;
+  }
+  for (const TaskId from : added) edges_.push_back({.from = from, .to = task, .since = at, .until = redag::kNever});
+}
+
+std::vector<redag::trace::Edge> TaskTable::edges() const {
+  const redag::LockGuard guard(lock_);
+  return edges_;
+}
+
 void TaskTable::drop(TaskId task) {
   std::shared_ptr<Callback> gone;  // declared before the guard: destroyed without the lock
   const redag::LockGuard guard(lock_);
@@ -342,6 +358,7 @@ Workload TaskTable::as_workload(Ids &ids, bool live) const {
       task.execution = {};
       if (task.budget > 0) task.budget = std::max(task.budget, task.wcet);
       task.callback = match_of(entry.id);
+      task.activation = redag::Activation::Timer;  // edges follow, or are beside the workload
       dag.tasks.push_back(std::move(task));
     }
     if (dag.tasks.empty()) continue;

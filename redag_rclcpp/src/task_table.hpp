@@ -36,6 +36,7 @@ class TaskTable {
     std::uint32_t dag = 0;          // position in dags()
     std::uint32_t rank = 0;         // topological rank within its DAG
     bool configured = false;        // named by the workload
+    std::uint32_t position = 0;     // if so: among the tasks of its DAG there
     bool in_default_group = false;  // of its node
     bool learned = false;           // its period is not the one it began with
   };
@@ -45,6 +46,13 @@ class TaskTable {
 
   /// The workload's DAGs without their tasks. The last one, "ros", is for callbacks that the workload does not name.
   [[nodiscard]] const std::vector<redag::Dag> &dags() const { return dags_; }
+
+  /// Notes which tasks a task waits for, from now on. `at` was read after the engine knew of new ones, `before` ahead
+  /// of that.
+  void set_predecessors(redag::TaskId task, const std::vector<redag::TaskId> &predecessors, redag::Time before,
+                        redag::Time at);
+  /// The edges that the executor has executed, and when.
+  [[nodiscard]] std::vector<redag::trace::Edge> edges() const;
 
   /// Sets the task of an id. An id may be reused after drop().
   void set(redag::TaskId task, Entry entry);
@@ -97,6 +105,7 @@ class TaskTable {
 
   mutable redag::PiMutex lock_;
   std::vector<Entry> entries_ REDAG_GUARDED_BY(lock_);  // indexed by TaskId
+  std::vector<redag::trace::Edge> edges_ REDAG_GUARDED_BY(lock_);
 };
 
 }  // namespace redag_rclcpp

@@ -82,6 +82,7 @@ class TimerCallback final : public Callback {
 
   void detach() override;
   void admit() override {}
+  [[nodiscard]] bool can_join() const override { return true; }
   [[nodiscard]] bool alive() const override { return !timer_.expired() && (!is_owned_ || !owner_.expired()); }
   [[nodiscard]] bool has_rate() const override { return true; }
   [[nodiscard]] Duration stated_period() const override { return period_of(*handle_); }
@@ -109,7 +110,7 @@ class TimerCallback final : public Callback {
 
  private:
   bool connect() override;
-  [[nodiscard]] bool run() override;
+  [[nodiscard]] bool run(Time release) override;
 
   /// True if only the guard condition reports resets, or jumps of the clock.
   [[nodiscard]] bool needs_wait_set() const;
@@ -253,7 +254,7 @@ void TimerCallback::drop_expiry() {
   reschedule();
 }
 
-bool TimerCallback::run() {
+bool TimerCallback::run(Time /*release*/) {
   const auto timer = timer_.lock();
   const auto owner = owner_.lock();  // the timer's function may use it
   if (!timer || (is_owned_ && !owner)) return false;

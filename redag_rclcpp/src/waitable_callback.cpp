@@ -15,6 +15,7 @@
 #include "compat.hpp"
 #include "entities.hpp"
 #include "hook.hpp"
+#include "redag_rclcpp/join.hpp"
 #include "stand_in.hpp"
 
 namespace redag_rclcpp {
@@ -40,11 +41,14 @@ class WaitableCallback final : public ArrivalCallback, public ActionClientCallba
                    const rclcpp::Waitable::SharedPtr &waitable)
       : ArrivalCallback(std::move(context), std::move(id), 0, compat::needs_wait_set(*waitable)),
         waitable_(waitable),
-        exchange_(exchange_of(*waitable)) {
+        exchange_(exchange_of(*waitable)),
+        is_join_(dynamic_cast<const JoinBase *>(waitable.get()) != nullptr) {
     if (exchange_.side != Exchange::Side::None) take_part_in_exchange();
   }
 
   [[nodiscard]] bool alive() const override { return !waitable_.expired(); }
+  // Other waitables can need a call for each time that they are ready.
+  [[nodiscard]] bool can_join() const override { return is_join_; }
   [[nodiscard]] Exchange exchange() const override { return exchange_; }
 
   // Functions of ActionClientCallback.
@@ -129,6 +133,10 @@ class WaitableCallback final : public ArrivalCallback, public ActionClientCallba
     return waitable && compat::is_hooked_by_user(*waitable);
   }
 
+  // A join drops messages itself.
+  void drop_skipped(Source source) override {
+    drop_messages(source, [] { return true; });
+  }
   [[nodiscard]] bool handle(const Token &token, Taking &taking) override {
     taking.begin();
     const auto waitable = waitable_.lock();
@@ -142,6 +150,7 @@ class WaitableCallback final : public ArrivalCallback, public ActionClientCallba
 
   const std::weak_ptr<rclcpp::Waitable> waitable_;
   const Exchange exchange_;
+  const bool is_join_;
   Hook event_hook_;                                     // of a QoS event whose hook is set below rclcpp
   bool hooked_ = false;                                 // hook() has set the on-ready hook, even if that failed
   std::atomic<redag::AsyncEvent *> stand_in_{nullptr};  // of the job that stands in; written under lock_
