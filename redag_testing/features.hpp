@@ -16,45 +16,17 @@
 
 namespace redag::testing {
 
+// Cooperative has preemption points; SharedLevels: fewer levels than tasks; ThreadLimit: max_started; AlignedEdges are
+// between timers, RateEdges between rates; Overlap: concurrency; Degraded: skip or stretch, where there is a HI mode;
+// Waits are without a device.
+// clang-format off
 enum class Feature : std::uint8_t {
-  SeveralWorkers,
-  Cooperative,  // with preemption points
-  FullPreemption,
-  SharedLevels,  // fewer levels than tasks
-  ThreadLimit,   // max_started
-  DeadlineMonotonic,
-  FixedPriorities,
-  ChainAware,
-  Edf,
-  Fifo,
-  FixedTies,
-  DataEdges,
-  Joins,         // of data
-  AlignedEdges,  // between timers
-  RateEdges,     // of timers and data, between rates
-  SeveralRates,
-  Offsets,
-  Jitter,
-  FreeTimers,  // offset: any
-  Events,
-  VaryingExecution,
-  ShortDeadlines,
-  EndToEndDeadlines,
-  Queues,
-  Overlap,  // concurrency
-  Groups,
-  GroupsAcrossDags,
-  MaxActive,
-  MaxPending,
-  CutOff,  // on_budget: abort
-  BudgetsThatGoOn,
-  HighMode,
-  Degraded,  // skip or stretch, where there is a HI mode
-  Waits,     // without a device
-  PriorityDevices,
-  FifoDevices,
-  Clusters,
+  SeveralWorkers, Cooperative, FullPreemption, SharedLevels, ThreadLimit, DeadlineMonotonic, FixedPriorities,
+  ChainAware, Edf, Fifo, FixedTies, DataEdges, Joins, AlignedEdges, RateEdges, SeveralRates, Offsets, Jitter,
+  FreeTimers, Events, VaryingExecution, ShortDeadlines, EndToEndDeadlines, Queues, Overlap, Groups, GroupsAcrossDags,
+  MaxActive, MaxPending, CutOff, BudgetsThatGoOn, HighMode, Degraded, Waits, PriorityDevices, FifoDevices, Clusters
 };
+// clang-format on
 inline constexpr std::size_t kFeatures = 37;
 
 using FeatureSet = std::bitset<kFeatures>;
