@@ -36,11 +36,11 @@ set(alone
   redag_lab/run/difference_test.cpp
   redag_testing/conformance_test.cpp
   redag_testing/differential_test.cpp
+  redag_testing/everything_test.cpp
   redag_testing/kernel_judge.cpp
   redag_testing/late_data_test.cpp
   redag_testing/overload_test.cpp
-  redag_testing/schedule_script.cpp
-  redag_testing/waits_test.cpp)
+  redag_testing/schedule_script.cpp)
 # What each job passes is compiled alone in optimised builds: beside others GCC inlines less there, and a job costs the
 # scheduler 25 % more instructions, and the engine 11 % (tools/count_instructions).
 if(NOT CMAKE_BUILD_TYPE STREQUAL "Debug")

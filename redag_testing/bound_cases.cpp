@@ -185,26 +185,8 @@ class CaseGenerator {
     if (limits_.caps && chance(rng_, 0.5)) {
       dag.max_active = between(rng_, 1, static_cast<std::uint32_t>(dag.tasks.size()));
     }
-    if (limits_.edges && limits_.phases && chance(rng_, limits_.rates ? 0.3 : 0.1)) free_sources(dag);
+    if (limits_.edges && limits_.phases && chance(rng_, limits_.rates ? 0.3 : 0.1)) free_sources(rng_, dag);
     if (limits_.edges && chance(rng_, 0.3)) dag.deadline = dag.tasks.front().period;
-  }
-
-  // Sources begin within their first period, as if all had been running before.
-  void free_sources(Dag &dag) {
-    for (Task &task : dag.tasks) {
-      if (task.activation == Activation::Data) continue;
-      task.offset %= task.period;
-      if (!task.predecessors.empty() || chance(rng_, 0.4)) continue;
-      task.phase = chance(rng_, 0.7) ? Phase::Unknown : Phase::Event;
-      task.offset = 0;
-    }
-    // No timer waits for jobs of the very same instants, which nothing promises then.
-    for (Task &task : dag.tasks) {
-      const bool is_timer = task.activation == Activation::Timer;
-      const bool waits = std::any_of(task.predecessors.begin(), task.predecessors.end(),
-                                     [&](std::uint32_t p) { return dag.tasks[p].phase != Phase::Common; });
-      if (is_timer && waits && task.offset == 0) task.offset = 1;
-    }
   }
 
   Rng &rng_;

@@ -2,11 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Clusters on one time line: each behaves as the only one would, and the trace checker notices a job in a wrong one.
+// everything_test.cpp has the properties of clusters that all runs have.
 #include <algorithm>
-#include <memory>
-#include <optional>
 #include <string>
-#include <tuple>
 #include <vector>
 
 #include <fmt/format.h>
@@ -18,16 +16,13 @@
 #include "redag/model/validate.hpp"
 #include "redag/sched/cluster_config.hpp"
 #include "redag/sched/priority_scheduler.hpp"
-#include "redag_analysis/executors/clustered.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/jobs.hpp"
 #include "redag_analysis/metrics/summary.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"
 #include "redag_analysis/sim/simulator.hpp"
-#include "redag_lab/search/analysed.hpp"
 #include "redag_testing/environment.hpp"
 #include "redag_testing/random_workloads.hpp"
-#include "redag_testing/reference_scheduler.hpp"
 
 namespace redag::testing {
 namespace {
@@ -38,12 +33,12 @@ constexpr Duration kHorizon = 100 * kMillisecond;
 std::string replay(std::uint64_t seed) { return fmt::format("replay with REDAG_SEED={} REDAG_WORKLOADS=1", seed); }
 
 template <class Test>
-void for_each_workload(std::uint64_t usual, Test test, bool overload = true) {
+void for_each_workload(std::uint64_t usual, Test test) {
   const std::uint64_t first = from_environment("REDAG_SEED").value_or(1);
   const std::uint64_t count = from_environment("REDAG_WORKLOADS").value_or(usual);
   for (std::uint64_t seed = first; seed < first + count && !::testing::Test::HasFatalFailure(); ++seed) {
     Rng rng(seed);
-    Workload workload = contended(rng, overload);
+    Workload workload = contended(rng);
     divide(rng, workload);
     ASSERT_FALSE(has_errors(validate(workload))) << to_string(validate(workload)) << replay(seed);
     test(workload, seed);
@@ -93,21 +88,6 @@ std::vector<JobEvent> part_of(const std::vector<JobEvent> &events, const std::ve
   return own;
 }
 
-std::string describe(const JobEvent &event) {
-  return fmt::format("{}: {} of task {} #{}, worker {}, value {}\n", event.time, to_string(event.kind),
-                     event.task.value, event.job, event.worker, event.value);
-}
-
-// Jobs that HI mode skips at one instant have no order. Which deferrals are counted is compared by
-// differential_test.cpp, which knows those that the schedulers may count differently.
-std::vector<JobEvent> sorted(std::vector<JobEvent> events) {
-  std::erase_if(events, [](const JobEvent &event) { return event.kind == JobEventKind::Deferred; });
-  const auto key = [](const JobEvent &event) { return std::tuple(event.time, event.kind, event.task, event.job); };
-  std::stable_sort(events.begin(), events.end(),
-                   [key](const JobEvent &a, const JobEvent &b) { return key(a) < key(b); });
-  return events;
-}
-
 TEST(Clustered, EachClusterRunsAsIfItWereAlone) {
   std::uint64_t compared = 0;
   for_each_workload(3000, [&](const Workload &workload, std::uint64_t seed) {
@@ -130,28 +110,6 @@ TEST(Clustered, EachClusterRunsAsIfItWereAlone) {
     }
   });
   EXPECT_GT(compared, 0U);
-}
-
-TEST(Clustered, DecidesAsReferenceSchedulersDo) {
-  for_each_workload(500, [](const Workload &workload, std::uint64_t seed) {
-    const sched::Config config = sched::config_of(workload);
-    executors::ClusteredScheduler reference(workload, [&](const ClusterPart &part) {
-      return std::make_unique<ReferenceScheduler>(part.workload, sched::config_of(config, part));
-    });
-    const std::vector<JobEvent> expected = sorted(events_of(workload, reference, options_of(seed)));
-    const std::vector<JobEvent> decided = sorted(simulated(workload, seed).events);
-    for (std::size_t i = 0; i < std::min(decided.size(), expected.size()); ++i) {
-      ASSERT_EQ(decided[i], expected[i]) << describe(decided[i]) << describe(expected[i]) << replay(seed);
-    }
-    ASSERT_EQ(decided.size(), expected.size()) << replay(seed);
-  });
-}
-
-TEST(Clustered, PassesTheTraceChecker) {
-  for_each_workload(1000, [](const Workload &workload, std::uint64_t seed) {
-    const metrics::CheckReport report = metrics::check_trace(simulated(workload, seed));
-    ASSERT_TRUE(report.ok()) << report.to_string() << replay(seed);
-  });
 }
 
 // Inversions of several clusters at one time count as one. Where only one cluster has any, they are the whole's.
@@ -210,30 +168,6 @@ TEST(Clustered, TheCheckerNoticesATimeThatGoesBackBetweenClusters) {
       break;
     }
   });
-}
-
-TEST(Clustered, NoResponseExceedsTheBoundOfItsCluster) {
-  std::uint64_t judged = 0;
-  for_each_workload(
-      400,
-      [&](const Workload &workload, std::uint64_t seed) {
-        const auto analysed = lab::analyse_parts(workload, analysis::platform_of(workload));
-        ASSERT_TRUE(analysed) << to_string(analysed.error()) << replay(seed);
-        std::vector<std::optional<Duration>> bounds(workload.task_count());
-        for (const lab::AnalysedPart &one : *analysed) {
-          for (std::size_t t = 0; t < one.part.tasks.size(); ++t) {
-            bounds[one.part.tasks[t].value] = one.analysed.report.tasks[t].response;
-          }
-        }
-        for (const metrics::JobRecord &job : metrics::fold_jobs(workload, simulated(workload, seed).events)) {
-          if (!bounds[job.task.value] || job.outcome != metrics::JobOutcome::Finished) continue;
-          ASSERT_LE(job.response(), *bounds[job.task.value])
-              << workload.dags.size() << " DAGs, task " << job.task.value << ", " << replay(seed);
-          ++judged;
-        }
-      },
-      false);
-  EXPECT_GT(judged, 1000U);
 }
 
 // Models of other executors: one instance for each cluster.

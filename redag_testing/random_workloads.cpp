@@ -107,6 +107,56 @@ void add_details(Rng &rng, Task &task) {
   if (chance(rng, 0.5)) task.priority = static_cast<int>(rng.uniform(-2, 2));
 }
 
+// Takes load and limits away, so that bounds exist. Times stay valid: a budget is never below the wcet.
+void relieve(Rng &rng, Workload &workload) {
+  for (Dag &dag : workload.dags) {
+    if (chance(rng, 0.7)) dag.max_pending = 0;
+    for (Task &task : dag.tasks) {
+      if (task.waits.empty()) {
+        task.wcet = std::max(task.wcet_low, std::max<Duration>(2, task.wcet / between(rng, 1, 4)));
+        task.bcet = std::min(task.bcet, task.wcet);
+      }
+      if (chance(rng, 0.95)) {
+        task.budget = 0;
+        task.on_budget = OnBudget::Abort;
+      }
+      if (chance(rng, 0.9)) task.concurrency = 1;
+      for (Wait &wait : task.waits) {
+        wait.longest = std::max<Duration>(1, wait.longest / between(rng, 1, 8));
+        wait.shortest = std::min(wait.shortest, wait.longest);
+      }
+    }
+  }
+}
+
+bool has_modes(const Workload &workload) {
+  const std::vector<TaskRef> tasks = flatten(workload);
+  return std::any_of(tasks.begin(), tasks.end(),
+                     [](const TaskRef &ref) { return ref.task->wcet_low > 0 && ref.task->wcet_low < ref.task->wcet; });
+}
+
+// Takes away what no bound knows together with a HI mode.
+void simplify(Rng &rng, Workload &workload) {
+  if (chance(rng, 0.8)) workload.platform.workers = 1;
+  if (chance(rng, 0.8)) workload.platform.preemption = PreemptionMode::Auto;
+  if (chance(rng, 0.8)) workload.policy = static_cast<PolicyKind>(between(rng, 0, 2));
+  const bool ungroup = chance(rng, 0.8);
+  for (Dag &dag : workload.dags) {
+    const bool calm = dag.criticality != Criticality::High && chance(rng, 0.8);
+    for (Task &task : dag.tasks) {
+      if (ungroup) task.group.clear();
+      if (calm) task.jitter = 0;
+    }
+  }
+}
+
+void limit_threads(Rng &rng, std::size_t task_count, sched::Config &config) {
+  if (config.preemption != sched::Preemption::Full) return;
+  const auto tasks = static_cast<std::uint32_t>(task_count);
+  if (is_static(config.policy) && chance(rng, 0.5)) config.levels = between(rng, 1, tasks);
+  if (chance(rng, 0.3)) config.max_started = config.workers + between(rng, 0, 2);
+}
+
 void add_overload(Rng &rng, Dag &dag) {
   dag.criticality = static_cast<Criticality>(between(rng, 0, 2));
   if (dag.criticality != Criticality::High) dag.degrade = random_degrade(rng, 3, 4);
@@ -148,6 +198,8 @@ Dag random_dag(Rng &rng, const RandomWorkloadLimits &limits) {
   inherit_periods(dag);
   for (Task &task : dag.tasks) {
     if (chance(rng, 0.3)) task.deadline = std::max(task.wcet, 10 * kMicrosecond * rng.uniform(1, 4));
+    if (task.activation == Activation::Timer && chance(rng, 0.15)) task.jitter = rng.uniform(1, task.period / 2);
+    if (dag.criticality == Criticality::High && chance(rng, 0.3)) task.wcet_low = rng.uniform(1, task.wcet);
   }
   return dag;
 }
@@ -223,16 +275,61 @@ void divide(Rng &rng, Workload &workload) {
   }
 }
 
+// Sources begin within their first period, as if all had been running before.
+void free_sources(Rng &rng, Dag &dag) {
+  for (Task &task : dag.tasks) {
+    if (task.activation == Activation::Data) continue;
+    task.offset %= task.period;
+    if (!task.predecessors.empty() || chance(rng, 0.4)) continue;
+    task.phase = chance(rng, 0.7) ? Phase::Unknown : Phase::Event;
+    task.offset = 0;
+  }
+  // No timer waits for jobs of the very same instants, which nothing promises then.
+  for (Task &task : dag.tasks) {
+    const bool is_timer = task.activation == Activation::Timer;
+    const bool waits = std::any_of(task.predecessors.begin(), task.predecessors.end(),
+                                   [&](std::uint32_t p) { return dag.tasks[p].phase != Phase::Common; });
+    if (is_timer && waits && task.offset == 0) task.offset = 1;
+  }
+}
+
+RandomRun random_run(Rng &rng) {
+  RandomRun run;
+  Workload &workload = run.workload;
+  const bool moderate = chance(rng, 0.5);
+  if (chance(rng, 0.3)) {
+    workload = random_workload(rng);
+    workload.policy = static_cast<PolicyKind>(between(rng, 0, 5));
+    constexpr std::array kModes{PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Auto};
+    workload.platform.preemption = kModes[between(rng, 0, 2)];
+  } else {
+    workload = contended(rng, !moderate || chance(rng, 0.4));
+    workload.ties = chance(rng, 0.7) ? Ties::Share : Ties::Fixed;
+  }
+  if (moderate) relieve(rng, workload);
+  if (moderate && has_modes(workload)) simplify(rng, workload);
+  if (chance(rng, 0.25)) {
+    divide(rng, workload);
+  } else if (chance(rng, 0.4)) {
+    add_waits(rng, workload);
+    if (moderate) relieve(rng, workload);
+  }
+  for (Dag &dag : workload.dags) {
+    if (chance(rng, 0.15)) free_sources(rng, dag);
+    if (chance(rng, 0.3)) dag.deadline = dag.tasks.front().period;
+  }
+  run.config = sched::config_of(workload);
+  limit_threads(rng, workload.task_count(), run.config);
+  return run;
+}
+
 sched::Config random_config(Rng &rng, PolicyKind policy, sched::Preemption preemption, std::size_t task_count) {
   sched::Config config;
   config.workers = between(rng, 1, 3);
   config.policy = policy;
   config.preemption = preemption;
   config.ties = chance(rng, 0.7) ? Ties::Share : Ties::Fixed;
-  if (preemption != sched::Preemption::Full) return config;
-  const auto tasks = static_cast<std::uint32_t>(task_count);
-  if (is_static(policy) && chance(rng, 0.5)) config.levels = between(rng, 1, tasks);
-  if (chance(rng, 0.3)) config.max_started = config.workers + between(rng, 0, 2);
+  limit_threads(rng, task_count, config);
   return config;
 }
 
@@ -258,13 +355,6 @@ std::string describe(const Workload &workload, const sched::Config &config) {
     }
   }
   return text;
-}
-
-rc::Gen<Workload> any_workload(const RandomWorkloadLimits &limits) {
-  return rc::gen::noShrink(rc::gen::map(rc::gen::arbitrary<std::uint64_t>(), [limits](std::uint64_t seed) {
-    Rng rng(seed);
-    return random_workload(rng, limits);
-  }));
 }
 
 }  // namespace redag::testing

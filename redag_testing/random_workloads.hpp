@@ -3,14 +3,13 @@
 
 // Random workloads for tests. random_workload() makes tiny ones with difficult features: equal periods and deadlines,
 // edges between rates, AND-joins, groups across DAGs, tight bounds and queues, several tasks a level. contended() makes
-// realistic ones with generate(). bound_property.hpp has those that satisfy the assumptions of a bound. Pure functions.
+// realistic ones with generate(). random_run() has all features. bound_property.hpp has those that satisfy the
+// assumptions of a bound. Pure functions.
 #pragma once
 
 #include <cstdint>
 #include <string>
 #include <vector>
-
-#include <rapidcheck.h>
 
 #include "redag/base/rng.hpp"
 #include "redag/model/workload.hpp"
@@ -52,15 +51,24 @@ void add_waits(Rng &rng, Workload &workload);
 /// one of its cluster.
 void divide(Rng &rng, Workload &workload);
 
+/// Gives sources of the DAG clocks of their own: free timers and events.
+void free_sources(Rng &rng, Dag &dag);
+
+/// A workload, and how a scheduler runs it.
+struct RandomRun {
+  Workload workload;
+  sched::Config config;
+};
+
+/// Draws every feature (features.hpp) with any others, for properties of all of them together: one of the workloads
+/// above, with waits or clusters, clocks, deadlines and limits. Half of the runs have a moderate load, and bounds.
+[[nodiscard]] RandomRun random_run(Rng &rng);
+
 /// Draws 1 to 3 workers. Full preemption with a static policy has limited levels or threads every other time.
 [[nodiscard]] sched::Config random_config(Rng &rng, PolicyKind policy, sched::Preemption preemption,
                                           std::size_t task_count);
 
 /// Describes the workload: one line per task.
 [[nodiscard]] std::string describe(const Workload &workload, const sched::Config &config);
-
-/// random_workload() for RapidCheck; it does not shrink. A property that drives a scheduler should draw a seed instead,
-/// which is printed when the property fails.
-[[nodiscard]] rc::Gen<Workload> any_workload(const RandomWorkloadLimits &limits = {});
 
 }  // namespace redag::testing

@@ -692,10 +692,15 @@ void ReferenceScheduler::tell_levels() {
 bool ReferenceScheduler::outranked(JobSlot job) const {
   if (config_.preemption != Preemption::Cooperative || jobs_[job.value].state != State::Running) return false;
   ReferenceScheduler copy = *this;
+  ReferenceScheduler without = *this;
+  without.dispatch(0);
   copy.preemption_point(job, 0);
   const Step step = copy.dispatch(0);
-  return std::any_of(step.dispatches.begin(), step.dispatches.end(),
-                     [job](const Dispatch &d) { return d.over == job; });
+  // A point at which another job only inherits must be reported, too.
+  const bool inherits = !std::equal(without.jobs_.begin(), without.jobs_.end(), copy.jobs_.begin(),
+                                    [](const Job &a, const Job &b) { return a.heir_of == b.heir_of; });
+  return inherits || std::any_of(step.dispatches.begin(), step.dispatches.end(),
+                                 [job](const Dispatch &d) { return d.over == job; });
 }
 
 // ---- reconfiguration and counts -------------------------------------------------------------------------------------

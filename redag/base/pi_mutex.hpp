@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "redag/base/futex_lock.hpp"
+#include "redag/base/lock_class.hpp"
 #include "redag/base/relax.hpp"
 #include "redag/base/thread_annotations.hpp"
 
@@ -25,20 +26,29 @@ namespace redag {
 class alignas(64) REDAG_CAPABILITY("mutex") PiMutex {
  public:
   /// `inherits` can be false if all threads that take the mutex have the same priority.
-  explicit PiMutex(bool inherits = true) : mutex_(inherits), inherits_(inherits), queue_(inherits) {}
+  explicit PiMutex(bool inherits = true, LockClass its_class = LockClass::Undeclared)
+      : mutex_(inherits), inherits_(inherits), class_(its_class), queue_(inherits) {}
+  explicit PiMutex(LockClass its_class) : PiMutex(true, its_class) {}
 
   PiMutex(const PiMutex &) = delete;
   PiMutex &operator=(const PiMutex &) = delete;
 
   /// Returns true if the mutex was free.
   bool lock() noexcept REDAG_ACQUIRE() {
-    if (try_lock()) return true;
-    wait();
-    return false;
+    detail::before_lock(class_);
+    const bool was_free = mutex_.try_lock();
+    if (!was_free) wait();
+    detail::after_lock(class_);
+    return was_free;
   }
-  [[nodiscard]] bool try_lock() noexcept REDAG_TRY_ACQUIRE(true) { return mutex_.try_lock(); }
+  [[nodiscard]] bool try_lock() noexcept REDAG_TRY_ACQUIRE(true) {
+    const bool was_free = mutex_.try_lock();
+    if (was_free) detail::after_lock(class_);
+    return was_free;
+  }
   /// Returns true if it woke a thread, which is a system call.
   bool unlock() noexcept REDAG_RELEASE() {
+    detail::before_unlock(class_);
     const bool queued = queued_;
     queued_ = false;
     const bool woke = mutex_.unlock();
@@ -69,6 +79,7 @@ class alignas(64) REDAG_CAPABILITY("mutex") PiMutex {
 
   FutexLock mutex_;
   const bool inherits_;
+  const LockClass class_;
   bool queued_ = false;  // the owner of `mutex_` also owns `queue_`
   FutexLock queue_;      // its owner is the only thread that sleeps for `mutex_`
 };

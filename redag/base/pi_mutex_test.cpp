@@ -16,6 +16,8 @@
 #include <thread>
 #include <vector>
 
+#include "redag/base/lock_guard.hpp"
+#include "redag/base/mutex.hpp"
 #include "redag/runtime/parker.hpp"
 #include "redag/runtime/threads.hpp"
 
@@ -140,6 +142,49 @@ TEST(PiMutex, TheOwnerRunsAtThePriorityOfWhoeverWaits) {
   let_go.set();
   for (std::thread &waiter : waiters) waiter.join();
   low.join();
+}
+
+class LockClassDeathTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if constexpr (!kChecksLockClasses) GTEST_SKIP() << "only debug builds check this";
+    ::testing::FLAGS_gtest_death_test_style = "threadsafe";
+  }
+};
+
+TEST_F(LockClassDeathTest, AThreadThatMustReactTakesNoUnboundedLock) {
+  PiMutex unbounded(LockClass::Unbounded);
+  Mutex ordinary;
+  { const LockGuard guard(unbounded); }
+  EXPECT_DEATH(
+      {
+        const MustReact here;
+        const LockGuard guard(unbounded);
+      },
+      "a thread that must react begins unbounded work, or waits for it");
+  EXPECT_DEATH(
+      {
+        const MustReact here;
+        const LockGuard guard(ordinary);
+      },
+      "a thread that must react");
+  const MustReact here;
+  PiMutex bounded(LockClass::Bounded);
+  const LockGuard guard(bounded);
+}
+
+TEST_F(LockClassDeathTest, NothingUnboundedBeginsUnderABoundedLock) {
+  PiMutex bounded(LockClass::Bounded);
+  {
+    const LockGuard guard(bounded);
+    EXPECT_DEATH(begin_unbounded_work(), "unbounded work begins under a lock");
+    Mutex ordinary;
+    EXPECT_DEATH(ordinary.lock(), "unbounded work begins under a lock");
+  }
+  ASSERT_TRUE(bounded.try_lock());
+  EXPECT_DEATH(begin_unbounded_work(), "unbounded work begins under a lock");
+  bounded.unlock();
+  begin_unbounded_work();
 }
 
 }  // namespace

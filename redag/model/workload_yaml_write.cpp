@@ -101,7 +101,7 @@ void write_overrun(Writer &out, const Task &task) {
 
 // Writes a factor as the shortest text that reads back the same.
 void write_degrade(Writer &out, const Degrade &degrade) {
-  if (degrade == Degrade{}) return;
+  if (degrade.kind == Degrade::Kind::Stop) return;
   out.text(to_string(Field::Degrade));
   out.begin_map(Layout::OneLine);
   if (degrade.kind == Degrade::Kind::Skip) {

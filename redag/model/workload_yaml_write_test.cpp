@@ -132,6 +132,13 @@ TEST(ToYaml, WritesPeriodsThatAreNoWholeRateAsTheyAre) {
   EXPECT_EQ(written("rate: 3kHz"), "period: 333.333us");
 }
 
+TEST(ToYaml, WritesTheKindOfDegradationAndNotWhatAnotherKindWouldUse) {
+  Workload workload =
+      parse_workload("dags: [{name: d, tasks: [{name: t, wcet: 1us, period: 1ms}]}]", "w.yaml")->workload;
+  workload.dags[0].degrade = Degrade{Degrade::Kind::Stop, 3, 2.5};
+  EXPECT_EQ(parse_workload(to_yaml(workload), "w.yaml")->workload.dags[0].degrade.kind, Degrade::Kind::Stop);
+}
+
 RC_GTEST_PROP(ToYaml, RoundTrips, ()) {
   const Workload workload = arbitrary_workload();
   const std::string text = to_yaml(workload);

@@ -30,7 +30,7 @@ constexpr Duration kPatience = 200 * kMicrosecond;
 
 Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions options)
     : options_(std::move(options)),
-      lock_(realtime()),
+      lock_(realtime(), LockClass::Bounded),
       scheduler_(std::move(scheduler)),
       pool_(os() ? options_.config.max_started : options_.config.workers + options_.spare_threads,
             options_.trace_capacity),

@@ -111,6 +111,7 @@ void Engine::run(Taker &taker, Time at) noexcept {
 }
 
 inline Outcome Engine::call(const Assignment &assignment, RunningJob &running) {
+  begin_unbounded_work();
   try {
     return assignment.woken == nullptr ? assignment.entry->body(assignment.job) : go_on(running);
   } catch (const BudgetExceeded &) {

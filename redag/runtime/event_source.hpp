@@ -44,7 +44,7 @@ class EventSource {
   const std::string place_;
   const Duration min_interval_;
   const EarlyRelease early_;
-  mutable PiMutex lock_;
+  mutable PiMutex lock_{LockClass::Bounded};
   Engine *engine_ REDAG_GUARDED_BY(lock_) = nullptr;
   TaskId task_ REDAG_GUARDED_BY(lock_);
   bool open_ REDAG_GUARDED_BY(lock_) = false;

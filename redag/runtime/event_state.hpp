@@ -22,7 +22,7 @@ struct EventState {
   /// Resets the event; returns true if it was set.
   [[nodiscard]] bool reset() REDAG_EXCLUDES(lock);
 
-  PiMutex lock;
+  PiMutex lock{LockClass::Bounded};
   bool is_set REDAG_GUARDED_BY(lock) = false;
   Wait *first REDAG_GUARDED_BY(lock) = nullptr;
 };

@@ -186,6 +186,7 @@ void Executor::Impl::on_overdue(const OverdueJob &job) {
     return;
   }
   try {
+    begin_unbounded_work();
     options_.on_overdue(info);
   } catch (...) {
     fail(std::current_exception());
@@ -259,6 +260,7 @@ void Executor::Impl::finish_record() {
 void Executor::Impl::on_exception(const Job &job, std::exception_ptr exception) {
   if (options_.on_exception) {
     const ExceptionInfo info{task_name(job.task), job.number, exception};
+    begin_unbounded_work();
     if (options_.on_exception(info) == OnException::Continue) return;
   }
   fail(std::move(exception));
@@ -299,6 +301,7 @@ void Executor::Impl::on_miss(const Miss &miss, std::uint64_t unreported) {
   };
   info.text = fmt::format("{} #{} {}", info.task, info.job, what());
   try {
+    begin_unbounded_work();
     options_.on_deadline_miss(info);
   } catch (...) {
     fail(std::current_exception());

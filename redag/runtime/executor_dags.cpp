@@ -151,6 +151,7 @@ void Executor::Impl::admit(const Dag &dag) const {
     }
   }
   with.dags.push_back(dag);
+  begin_unbounded_work();
   if (const Result<void> admitted = options_.admission(with, engine_->options().config); !admitted) {
     throw AdmissionRefused(fmt::format("DAG '{}' is not admitted: {}", dag.name, to_string(admitted.error())));
   }

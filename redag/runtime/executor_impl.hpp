@@ -101,8 +101,7 @@ class Executor::Impl {
   std::unique_ptr<ReleaseTimer> timer_;
   std::unique_ptr<Watchdog> watchdog_;  // runs from start() until no body is left
   Mutex adding_;  // held by the one thread that adds a DAG, also while options_.admission computes; taken before lock_
-  // Threads above all jobs take it: nothing that is long is done under it.
-  mutable PiMutex lock_;
+  mutable PiMutex lock_{LockClass::Bounded};  // threads above all jobs take it
   // Without a trace the engine uses ids again. Memory then does not grow with the number of former DAGs.
   std::map<std::uint32_t, Added> dags_ REDAG_GUARDED_BY(lock_);  // by DagId
   std::uint32_t next_dag_ REDAG_GUARDED_BY(lock_) = 0;

@@ -94,6 +94,7 @@ void ReleaseThread::run() noexcept {
 }
 
 Time ReleaseThread::expire() {
+  const MustReact here;
   const Time next = ended_ ? kNever : expire_();
   next_.store(next, std::memory_order_relaxed);
   return next;

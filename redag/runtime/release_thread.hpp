@@ -67,7 +67,7 @@ class ReleaseThread {
   void set_alarm() REDAG_REQUIRES(lock_);
 
   const Expire expire_;
-  PiMutex lock_;
+  PiMutex lock_{LockClass::Bounded};
   Time led_ REDAG_GUARDED_BY(lock_) = kNever;      // the release that the leader waits for; kNever: none
   Duration patience_ REDAG_GUARDED_BY(lock_) = 0;  // of the thread with the leader
   Time alarm_at_ REDAG_GUARDED_BY(lock_) = kNever;
@@ -75,7 +75,7 @@ class ReleaseThread {
   std::atomic<Time> next_{kNever};  // written under the lock
   Alarm alarm_;
   Atomic<bool> stopping_{false};
-  PiMutex priority_lock_;  // never held while something is released
+  PiMutex priority_lock_{LockClass::Bounded};  // never held while something is released
   int priority_ REDAG_GUARDED_BY(priority_lock_) = 0;
   // The thread, until it ends.
   std::optional<decltype(std::declval<ThreadHandle &>().native_handle())> alive_ REDAG_GUARDED_BY(priority_lock_);

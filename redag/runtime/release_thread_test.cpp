@@ -9,6 +9,8 @@
 #include <atomic>
 #include <thread>
 
+#include "redag/base/lock_guard.hpp"
+#include "redag/base/mutex.hpp"
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/parker.hpp"
 
@@ -140,6 +142,16 @@ TEST_F(ReleaseThreadTest, NeedsAFileDescriptor) {
   ASSERT_FALSE(refused);
   EXPECT_NE(to_string(refused.error()).find("ulimit -n"), std::string::npos) << to_string(refused.error());
   EXPECT_TRUE(thread.start({})) << "it can be started again";
+}
+
+TEST(ReleaseThreadDeathTest, ReleasesNothingThatTakesAnUnboundedLock) {
+  if constexpr (!kChecksLockClasses) GTEST_SKIP() << "only debug builds check this";
+  Mutex ordinary;
+  ReleaseThread thread([&] {
+    const LockGuard guard(ordinary);
+    return kNever;
+  });
+  EXPECT_DEATH(thread.release_due(), "a thread that must react");
 }
 
 }  // namespace

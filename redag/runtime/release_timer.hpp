@@ -50,7 +50,7 @@ class ReleaseTimer {
   Time expire();
 
   const Sink sink_;
-  PiMutex lock_;
+  PiMutex lock_{LockClass::Bounded};
   ReleaseHeap heap_ REDAG_GUARDED_BY(lock_);
   std::vector<Release> due_ REDAG_GUARDED_BY(lock_);
   Time origin_ REDAG_GUARDED_BY(lock_) = kNever;  // kNever: before begin()

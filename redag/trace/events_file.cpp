@@ -417,19 +417,20 @@ class EventsReader::Impl {
   Result<void> cut_last_instant() {
     std::vector<JobEvent> events;
     std::uint64_t kept = replaced_;  // before the last instant
-    footer.end = info.start;
+    Time last = info.start;
     for (;;) {
       const std::uint64_t before = count_;
       const Result<bool> more = next(events);
       if (!more) return tl::unexpected<Diagnostics>(more.error());
       if (!*more) break;
       for (std::size_t i = 0; i < events.size(); ++i) {
-        if (events[i].time <= footer.end && before + i > replaced_) continue;
-        footer.end = std::max(footer.end, events[i].time);
+        if (events[i].time <= last && before + i > replaced_) continue;
+        last = std::max(last, events[i].time);
         kept = before + i;
       }
     }
     footer.events = kept;
+    footer.end = std::max(info.start, last - 1);
     const std::uint64_t rest = file_.size() - blocks_end_;
     info.remarks.push_back({.begun = footer.end,
                             .text = "the record ends here: the run was killed, or still goes on" +

@@ -76,7 +76,8 @@ struct RunInfo {
   Driver driver = Driver::Simulator;
   std::uint64_t seed = 0;
   Time start = 0;                 // origin of the release grid: job k of a timer is released at start + offset + k * T
-  Time end = 0;                   // horizon: nothing is released at or after it; jobs may finish later
+  Time end = 0;                   // horizon: nothing is released at or after it. A record that was cut has all
+                                  // events up to this instant, and none of later ones
   Duration warm_up = 0;           // jobs released before start + warm_up are not counted
   bool stepped = false;           // at times no job could start, or one at a time: a free worker proves nothing
   std::uint64_t lost_events = 0;  // dropped by full rings: the stream has holes if > 0

@@ -138,7 +138,7 @@ void DeviceRules::end_of_trace() {
     const Task &task = context_.replay.task(waiting.job.task);
     if (waiting.wait >= task.waits.size()) continue;
     const Duration length = context_.wait_of(waiting.job.task, waiting.job.number, waiting.wait);
-    context_.expect(Rule::Device, context_.info.end - waiting.since <= length, waiting.job.task, waiting.job.number,
+    context_.expect(Rule::Device, context_.info.end - waiting.since < length, waiting.job.task, waiting.job.number,
                     [&] { return "it was never woken, although its wait takes only " + format_duration(length); });
   }
 }

@@ -82,7 +82,7 @@ TEST(CheckDevice, AWaitBeginsAndEndsWhenItsTaskSays) {
   TraceBuilder late = t;
   t.at(2).woken("hi", 0, 0);
   expect_broken(t.until(2), Rule::Device);
-  expect_broken(late.until(4), Rule::Device);  // never woken
+  expect_broken(late.until(3), Rule::Device);  // never woken
 }
 
 TEST(CheckDevice, AJobWaitsWhereItsTaskDoesAndAsOften) {

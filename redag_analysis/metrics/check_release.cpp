@@ -359,7 +359,7 @@ void ReleaseRules::end_of_trace() {
   if (context_.info.driver != trace::Driver::Simulator) return;
   for (std::size_t t = 0; t < tasks_.size(); ++t) {
     const TaskId id(t);
-    if (!tasks_[t].timer || is_removed(id)) continue;
+    if (!tasks_[t].timer || !tasks_[t].on_grid || is_removed(id)) continue;
     const Task &task = context_.replay.task(id);
     const std::uint32_t next = tasks_[t].next_number;
     const Int128 due = Int128{context_.info.start} + task.offset + Int128{next} * task.period;

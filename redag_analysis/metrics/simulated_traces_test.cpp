@@ -5,8 +5,12 @@
 // must notice if any event of a good trace is dropped, doubled or shifted.
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
 
 #include "redag/base/rng.hpp"
+#include "redag/trace/events_file.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/summary.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"
@@ -50,6 +54,24 @@ TEST(SimulatedTraces, AHolderInheritsOnlyFromJobsThatAreLookedAt) {
   workload.ties = Ties::Fixed;
   const CheckReport report = check_trace(simulated(testing::run_info(workload, "redag", 0), 200 * kMillisecond));
   EXPECT_TRUE(report.ok()) << report.to_string();
+}
+
+// A run that is killed leaves a record that ends anywhere. Jobs that would end at the next instant have nothing left.
+TEST(SimulatedTraces, KeepEveryRuleUpToAnyCut) {
+  const std::string path =
+      (std::filesystem::path(::testing::TempDir()) / ("redag_cut." + std::to_string(::getpid()) + ".redag")).string();
+  for (std::uint64_t seed = 0; seed < 12; ++seed) {
+    const trace::Trace whole = simulated(drawn(seed), 100 * kMillisecond);
+    const std::size_t step = whole.events.size() / 40 + 1;
+    for (std::size_t count = 0; count < whole.events.size(); count += step) {
+      trace::EventsWriter writer = trace::EventsWriter::record(path, whole.info).value();
+      writer.add(std::span(whole.events).first(count));
+      ASSERT_TRUE(writer.flush(0));
+      const CheckReport report = check_trace(trace::read_trace(path).value());
+      ASSERT_TRUE(report.ok()) << "seed " << seed << ", " << count << " events\n" << report.to_string();
+    }
+  }
+  std::filesystem::remove(path);
 }
 
 // Nothing may depend on where time 0 is: a run can begin before it.

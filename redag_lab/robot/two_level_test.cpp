@@ -179,6 +179,7 @@ Workload random_process(Rng &rng, double most_load, double groups) {
   limits.min_workers = limits.max_workers = 2;
   limits.policies = {PolicyKind::RateMonotonic};
   limits.edges = testing::chance(rng, 0.6);
+  limits.rates = limits.edges && testing::chance(rng, 0.3);
   limits.max_dags = 3;
   limits.max_tasks = 3;
   limits.groups = testing::chance(rng, groups);
@@ -477,7 +478,7 @@ TEST(RobotUnionBounds, HoldForDataOfOtherProcesses) {
 // The same, with bounds that count from the release of the data: they do not hold.
 TEST(RobotUnionBounds, BreakWhereDataAreTakenToBeThere) {
   std::uint64_t violations = 0;
-  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 400; ++seed) {
     Rng rng(seed);
     Robot robot = random_robot(rng, {0, 1}, kLoadWithLinks);
     add_receiver(rng, robot);

@@ -19,6 +19,7 @@
 #include "redag/base/mutex.hpp"
 #include "redag/base/pi_mutex.hpp"
 #include "redag/base/rng.hpp"
+#include "redag/runtime/blocking.hpp"
 #include "redag/runtime/clock.hpp"
 #include "redag/runtime/executor.hpp"
 #include "redag/runtime/preemption_point.hpp"
@@ -50,9 +51,10 @@ enum Fault : std::uint8_t {
   AddsADag,
   RemovesItsDag,
   WaitsForItself,
+  Blocks,
   Stops,
 };
-constexpr std::array<const char *, 13> kFaultNames = {"bodies without a fault",
+constexpr std::array<const char *, 14> kFaultNames = {"bodies without a fault",
                                                       "bodies that throw",
                                                       "bodies that throw what is no exception",
                                                       "bodies that throw bad_alloc",
@@ -64,6 +66,7 @@ constexpr std::array<const char *, 13> kFaultNames = {"bodies without a fault",
                                                       "bodies that add a DAG",
                                                       "bodies that remove their own DAG",
                                                       "bodies that wait for their executor",
+                                                      "bodies that block and lend their workers",
                                                       "bodies that stop the executor"};
 
 std::atomic<Executor *> signalled{nullptr};
@@ -105,6 +108,8 @@ class Run {
     options.policy = static_cast<PolicyKind>(rng_.uniform(0, 5));
     options.trace_capacity = 1U << 16U;
     options.threads = options.workers + static_cast<std::uint32_t>(rng_.uniform(0, 6));
+    options.spare_threads = static_cast<std::uint32_t>(rng_.uniform(0, 2));
+    options.ties = rng_.uniform01() < 0.7 ? Ties::Share : Ties::Fixed;
     options.stop_timeout = 60s;
     options.on_exception = [this](const runtime::ExceptionInfo &) {
       ++exceptions_;
@@ -173,6 +178,10 @@ class Run {
     runtime::DagOptions dag_options;
     dag.max_active = dag_options.max_active = static_cast<std::uint32_t>(dice_.uniform(0, 2));
     dag.max_pending = dag_options.max_pending = static_cast<std::uint32_t>(dice_.uniform(0, 3));
+    dag.criticality = dag_options.criticality = static_cast<Criticality>(dice_.uniform(0, 2));
+    if (dag.criticality != Criticality::High && dice_.uniform01() < 0.5) {
+      dag.degrade = dag_options.degrade = Degrade{Degrade::Kind::Skip, 1, 2};
+    }
     DagBuilder builder(dag.name, dag_options);
     std::vector<TaskHandle> handles;
     const auto tasks = dice_.uniform(1, 4);
@@ -182,7 +191,13 @@ class Run {
       task.wcet = kWcet;
       runtime::TaskOptions options;
       options.wcet = nanoseconds(kWcet);
+      task.criticality = dag.criticality;
       if (dice_.uniform01() < 0.2) options.group = task.group = "g";
+      if (task.group.empty() && dice_.uniform01() < 0.2) options.concurrency = task.concurrency = 2;
+      if (dag.criticality == Criticality::High && dice_.uniform01() < 0.3) {
+        task.wcet_low = kWcet / 2;
+        options.wcet_low = nanoseconds(task.wcet_low);
+      }
       if (dice_.uniform01() < 0.3) {
         options.overrun = task.overrun = Overrun::Queue;
         options.queue_depth = task.queue_depth = static_cast<std::uint32_t>(dice_.uniform(1, 4));
@@ -190,6 +205,7 @@ class Run {
       if (dice_.uniform01() < 0.3) {
         task.budget = 100 * kMicrosecond;
         options.budget = nanoseconds(task.budget);
+        options.on_budget = task.on_budget = static_cast<OnBudget>(dice_.uniform(0, 3));
       }
       const auto body = [this, number, alive = alive_] { misbehave(DagId(number)); };
       if (i > 0 && dice_.uniform01() < 0.5) {
@@ -261,6 +277,11 @@ class Run {
         } catch (const std::logic_error &) {
         }
         break;
+      case Blocks: {
+        const Blocking lends;
+        std::this_thread::sleep_for(nanoseconds(dice.uniform(1, 1'000'000)));
+        break;
+      }
       case Stops: executor_->stop(); break;
     }
   }
@@ -272,6 +293,7 @@ class Run {
     trace.info.driver = trace::Driver::Threads;
     trace.info.workload.name = "chaos";
     trace.info.workload.policy = policy_;
+    trace.info.workload.ties = trace.info.config.ties;
     trace.info.workload.platform.workers = trace.info.config.workers;
     trace.info.workload.dags = dags_;
     trace.info.lost_events = executor_->lost_events();
