@@ -70,6 +70,16 @@ struct Peers {
 /// One unit alone; its place among the others is not determined.
 [[nodiscard]] GlobalUnit unit_of(const TaskSet &task_set, std::uint32_t unit);
 
+/// What a unit does before one of its tasks ends, if its instances do not overlap.
+struct Part {
+  std::vector<std::uint32_t> tasks;  // TaskIds: all that do not follow the task
+  std::vector<std::uint32_t> paths;  // those that lead to the task, and the task
+};
+[[nodiscard]] Part part_until(const TaskSet &task_set, std::uint32_t task);
+
+/// narrow() leaves of a unit only this part. Its work in the windows of others is not that of the part.
+void narrow(const TaskSet &task_set, const Part &part, GlobalUnit &unit);
+
 /// True if no response is within the limit: there is more work than the workers can do until then. Sums of such a unit
 /// can wrap.
 [[nodiscard]] bool is_hopeless(const GlobalUnit &unit, std::uint32_t workers);

@@ -39,7 +39,8 @@ Outcome bound_in_order(const TaskSet &task_set) {
       [&](std::size_t k, bool alone) {
         return contention.respond(k, alone ? 0 : view.units[k].response - view.units[k].jitter);
       },
-      [&](std::size_t k) { return contention.explain(k); });
+      [&](std::size_t k) { return contention.explain(k); },
+      [&](GlobalUnit &unit, const global::Part *part) { contention.narrow(unit, part); });
 }
 
 Outcome bound_in_any_order(const TaskSet &task_set) {
