@@ -3,6 +3,7 @@
 
 #include "redag_analysis/many_workers/fixed_point.hpp"
 
+#include <algorithm>
 #include <cstddef>
 #include <utility>
 
@@ -53,7 +54,7 @@ Bound from_most_urgent(const TaskSet &task_set, std::vector<GlobalUnit> &units,
                        const std::function<void(GlobalUnit &)> &start,
                        const std::function<bool(std::size_t, bool)> &respond,
                        const std::function<ResponseBound(std::size_t)> &explain,
-                       const std::function<void(GlobalUnit &, const Part *)> &narrow) {
+                       const std::function<void(GlobalUnit &, const Part *)> &narrow, bool overlap) {
   std::vector<ResponseBound> responses(task_set.units.size());
   std::vector<std::pair<std::uint32_t, ResponseBound>> parts;  // by task
   // Bounds the tasks of the unit at this position. It is bounded, so its instances do not overlap, and a task waits
@@ -106,6 +107,10 @@ Bound from_most_urgent(const TaskSet &task_set, std::vector<GlobalUnit> &units,
         return whole;
       });
     }
+    if (known || !overlap) continue;
+    known = std::all_of(units.begin() + static_cast<std::ptrdiff_t>(peers.begin),
+                        units.begin() + static_cast<std::ptrdiff_t>(peers.end),
+                        [&](GlobalUnit &unit) { return assume_overlap(task_set, unit); });
   }
   Bound bound = from_units(task_set, std::move(responses));
   for (auto &[task, part] : parts) bound.tasks[task] = if_bounded(std::move(part));

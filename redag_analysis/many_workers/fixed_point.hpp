@@ -63,12 +63,14 @@ template <class Next>
 /// k), and returns false above its limit; explain(k) follows a call of it. Each of several peers (peers_of()) is
 /// treated as the last of them, with `alone` false. Their responses are the least that agree, beginning with those that
 /// start() sets; otherwise none of them has one. In a unit with a bound each task has one of its own: that of the part
-/// of the unit before its end. narrow() leaves that part of units[k], and null gives back the whole.
+/// of the unit before its end. narrow() leaves that part of units[k], and null gives back the whole. Below a unit
+/// without a bound none has one, unless `overlap`: then assume_overlap() holds for that unit.
 [[nodiscard]] Bound from_most_urgent(const TaskSet &task_set, std::vector<GlobalUnit> &units,
                                      const std::function<void(GlobalUnit &unit)> &start,
                                      const std::function<bool(std::size_t k, bool alone)> &respond,
                                      const std::function<ResponseBound(std::size_t k)> &explain,
-                                     const std::function<void(GlobalUnit &unit, const Part *part)> &narrow = nullptr);
+                                     const std::function<void(GlobalUnit &unit, const Part *part)> &narrow = nullptr,
+                                     bool overlap = false);
 
 /// Applies agree() to the responses of `units`, which respond(k) sets. All units have the bound that explain(k) gives,
 /// or none has; none has if one unit is hopeless.

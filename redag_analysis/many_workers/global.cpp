@@ -157,6 +157,22 @@ Peers peers_of(const TaskSet &task_set, const std::vector<GlobalUnit> &units, st
   return peers;
 }
 
+// Of each task one job may have started, others are queued, and one waits for predecessors. A data task has no more
+// releases than a predecessor has ends, and of those at most that number are of jobs from before the window.
+bool assume_overlap(const TaskSet &task_set, GlobalUnit &unit) {
+  const Unit &compiled = task_set.units[unit.unit];
+  Duration unfinished = 0;
+  for (const std::uint32_t t : compiled.tasks) {
+    unfinished = add(unfinished, std::max<Duration>(1, task_set.tasks[t].limit / compiled.period) + 2);
+  }
+  // One more period for the division, and the volume, which dag_work() takes for done in time.
+  unit.response = add(add(compiled.jitter, multiply(unit.period, unfinished + 1)), compiled.volume);
+  constexpr Duration kLongest = Duration{1} << 44U;
+  constexpr Duration kLargestLoad = 16;
+  const Duration width = task_set.platform.workers;
+  return unit.response < kLongest / width && compiled.volume / compiled.period < kLargestLoad * width;
+}
+
 Part part_until(const TaskSet &task_set, std::uint32_t task) {
   const std::vector<std::uint32_t> &tasks = task_set.units[task_set.tasks[task].unit].tasks;
   Part part;
