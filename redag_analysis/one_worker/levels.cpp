@@ -188,6 +188,29 @@ void Levels::find_longest() {
   }
 }
 
+// However many less urgent jobs end, each task that does not count follows once. Returns the smaller sum: that of
+// `all`, or of the longest stretches and all these tasks.
+std::vector<Once> Levels::all_follow_once(std::vector<Once> all, std::vector<Once> stretches, const Once &follow) {
+  const auto sum = [](const std::vector<Once> &of) {
+    return std::accumulate(of.begin(), of.end(), Duration{0},
+                           [](Duration before, const Once &once) { return before + once.stretch + once.follows; });
+  };
+  if (follow.follows > 0) stretches.push_back(follow);
+  return sum(stretches) < sum(all) ? stretches : all;
+}
+
+// The tasks of the level in units that it divides that `is_new` accepts, as what follows one of them.
+template <class IsNew>
+Once Levels::new_at(std::uint32_t level, IsNew is_new) const {
+  Once all;
+  for (const std::uint32_t u : divided_) {
+    for (const std::uint32_t t : task_set_.units[u].tasks) {
+      if (tier_[t] <= level && is_new(t)) all = Once{t, 0, add(all.follows, task_set_.tasks[t].wcet)};
+    }
+  }
+  return all;
+}
+
 // A less urgent job can run in the busy period only if it started strictly before, or ends as the period begins: one
 // job that keeps the worker, and for each group the job that holds it. Its end releases tasks of the level.
 std::vector<Once> Levels::once(std::uint32_t task, std::uint32_t level, const std::vector<std::uint32_t> &own) const {
@@ -212,11 +235,13 @@ std::vector<Once> Levels::once(std::uint32_t task, std::uint32_t level, const st
   };
   const auto is_longer = [](const Once &a, const Once &b) { return a.stretch + a.follows > b.stretch + b.follows; };
   Once longest = longest_[level];
+  Once longest_stretch = longest;
   Once released;
   const auto consider = [&](std::uint32_t t, Duration stretch) {
     if (tier_[t] <= level) return;
     const Once found{t, std::max<Duration>(stretch, 0), follows(t)};
     if (is_longer(found, longest)) longest = found;
+    if (found.stretch > longest_stretch.stretch) longest_stretch = Once{t, found.stretch, 0};
     if (found.follows > released.follows) released = Once{t, 0, found.follows};
   };
   for (const std::uint32_t u : divided_) {
@@ -231,24 +256,30 @@ std::vector<Once> Levels::once(std::uint32_t task, std::uint32_t level, const st
     consider(t, task_set_.tasks[t].wcet - 1);
   }
   std::vector<Once> all;
+  std::vector<Once> longest_stretches;
+  if (longest_stretch.stretch > 0) longest_stretches.push_back(longest_stretch);
   if (task_set_.mode == sched::Preemption::Full) {
     for (const std::vector<std::uint32_t> &group : task_set_.groups) {
       // While a job holds the group for a task of this platform level or above, no task of the level preempts it.
       bool is_needed = false;
       Once holder;
+      Once longest_holder;
       for (const std::uint32_t t : group) {
         is_needed = is_needed || task_set_.tasks[t].level <= platform_level;
         if (tier_[t] <= level || task_set_.tasks[t].wcet == 1) continue;
         const Once found{t, task_set_.tasks[t].wcet - 1, follows(t)};
         if (is_longer(found, holder)) holder = found;
+        if (found.stretch > longest_holder.stretch) longest_holder = Once{t, found.stretch, 0};
       }
-      if (is_needed && holder.stretch > 0) all.push_back(holder);
+      if (!is_needed || holder.stretch == 0) continue;
+      all.push_back(holder);
+      longest_stretches.push_back(longest_holder);
     }
     // With inheritance, the job that ends as the period begins need not be the one that keeps the worker.
     if (!task_set_.groups.empty() && longest.stretch > 0 && released.follows > 0) all.push_back(released);
   }
   if (longest.stretch + longest.follows > 0) all.push_back(longest);
-  return all;
+  return all.size() > 1 ? all_follow_once(std::move(all), longest_stretches, new_at(level, is_new)) : all;
 }
 
 std::vector<Interferer> Levels::others(std::uint32_t unit, std::uint32_t level) {

@@ -55,6 +55,10 @@ class Levels {
   [[nodiscard]] bool is_seen_apart(const Unit &unit) const;
   [[nodiscard]] std::vector<bool> after(std::uint32_t task, bool in_order) const;
   void find_longest();
+  [[nodiscard]] static std::vector<Once> all_follow_once(std::vector<Once> all, std::vector<Once> stretches,
+                                                         const Once &follow);
+  template <class IsNew>
+  [[nodiscard]] Once new_at(std::uint32_t level, IsNew is_new) const;
 
   const TaskSet &task_set_;
   std::vector<std::uint32_t> tier_;        // by TaskId; of a unit that is not divided, its least urgent

@@ -226,7 +226,7 @@ std::string describe(const lab::Analysed &analysed, const StreamTraits &terminal
   text += "\n" + table_of("DAG", lab::dag_rows(analysed), terminal) + "\n";
   text +=
       "bound: response time from the nominal release that no job exceeds; for a DAG, and for its tasks where edges "
-      "join them, from the source's release to the finish of the last task; verdicts hold for every execution\n";
+      "join them, from the source's release; verdicts hold for every execution\n";
   for (const lab::Row &row : tasks) {
     if (*row.due == row.deadline) continue;
     text +=
