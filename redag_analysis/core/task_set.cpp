@@ -142,7 +142,9 @@ class Compiler {
     compiled.name = dag.name;
     compiled.deadline = dag.deadline;
     compiled.high = dag.criticality == Criticality::High;
-    if (dag.max_active < dag.tasks.size()) compiled.max_active = dag.max_active;
+    std::uint64_t at_once = 0;
+    for (const Task &task : dag.tasks) at_once += task.concurrency;
+    if (dag.max_active < at_once) compiled.max_active = dag.max_active;
     const auto first = static_cast<std::uint32_t>(task_set_.tasks.size());
     std::uint64_t waiting = 0;
     for (const Task &task : dag.tasks) {
