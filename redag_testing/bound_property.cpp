@@ -81,12 +81,17 @@ struct Observed {
   std::vector<std::uint64_t> finished;
 };
 
-void observe(const metrics::JudgedJob &job, const analysis::TaskSet &task_set, Observed &observed) {
+void observe(const metrics::JudgedJob &job, const analysis::TaskSet &task_set, bool from_source, Observed &observed) {
   const TaskId task = job.record.task;
   if (task.value >= task_set.tasks.size()) return;  // a stall
   if (job.miss == metrics::Miss::Lost) ++observed.lost[task.value];
   if (job.record.outcome == metrics::JobOutcome::Finished) ++observed.finished[task.value];
-  if (job.response) observed.tasks[task.value] = std::max(observed.tasks[task.value], *job.response);
+  const analysis::CompiledTask &compiled = task_set.tasks[task.value];
+  Duration &response = observed.tasks[task.value];
+  if (job.response) response = std::max(response, *job.response);
+  const bool has_source = !compiled.predecessors.empty() && task_set.units[compiled.unit].awaits.empty();
+  if (job.response && from_source && has_source)
+    response = std::max(response, *job.response + job.record.release - job.record.origin);
   Duration &dag = observed.dags[task_set.tasks[task.value].dag.value];
   if (job.end_to_end) dag = std::max(dag, *job.end_to_end);
 }
@@ -176,7 +181,7 @@ void simulate_run(const BoundCase &bound_case, const analysis::TaskSet &task_set
   const sched::Config config = analysis::config_of(platform, workload);
   const auto scheduler = executors::make_scheduler(property.executor, workload, config);
   metrics::DeadlineWatch watch(workload);
-  const auto see = [&](const metrics::JudgedJob &job) { observe(job, task_set, observed); };
+  const auto see = [&](const metrics::JudgedJob &job) { observe(job, task_set, property.from_source, observed); };
   const sim::Result result =
       sim::simulate(workload, *scheduler, platform.workers, options, [&](std::span<const JobEvent> events) {
         watch.add(events, see);
@@ -258,7 +263,9 @@ void check_one(const analysis::Method &method, const BoundGenerator &generator, 
   const executors::ExecutorKind &executor = *executors::find_executor(options.executor);
   const auto task_set = analysis::compile_for(executor, bound_case.workload, bound_case.platform);
   ASSERT_TRUE(task_set) << to_string(task_set.error()) << describe(bound_case);
-  if (!task_set->not_analysable.empty() && !(task_set->has_waits && method.knows_waits)) {
+  const bool is_covered =
+      task_set->not_analysable.empty() || (task_set->has_waits && method.knows_waits) || options.include_refused;
+  if (!is_covered) {
     ++result.not_applicable;
     return;
   }

@@ -74,6 +74,10 @@ struct BoundPropertyOptions {
   std::uint32_t runs = 5;          // simulations of each workload
   std::uint32_t periods = 10;      // length of a simulation, in largest periods
   std::string executor = "redag";  // one of executors::all(), under which the bound must hold
+  /// Each task of a DAG of one rate is bounded from its source's release; otherwise from its own, as its deadline is.
+  bool from_source = false;
+  /// Also asks the method about task sets that it must not bound as a whole.
+  bool include_refused = false;
   /// Also tests bounds that a method itself calls unsound, to show that they are.
   bool include_unsound = false;
 };

@@ -12,7 +12,7 @@ namespace {
 void keep_tightest(std::vector<Tightest> &best, const std::vector<ResponseBound> &found, const Method &method) {
   for (std::size_t i = 0; i < found.size() && i < best.size(); ++i) {
     if (!found[i].response || (best[i].response && *best[i].response <= *found[i].response)) continue;
-    best[i] = Tightest{found[i].response, &method, found[i]};
+    best[i] = Tightest{found[i].response, &method, found[i], nullptr};
   }
 }
 
@@ -37,6 +37,35 @@ MethodReport run(const TaskSet &task_set, const Method &method, const Effort::Li
     report.trusted = bound->unsound.empty();
   }
   return report;
+}
+
+// Bounds more of the most urgent tasks, as if they were alone.
+void bound_alone(const TaskSet &task_set, const std::vector<Method> &methods, const Effort::Limits &limits,
+                 Report &report) {
+  const auto lacks_bound = [&](std::uint32_t t) { return !report.tasks[t].response; };
+  std::vector<MostUrgent> parts;
+  for (std::uint32_t t = 0; t < task_set.tasks.size() && parts.empty(); ++t) {
+    if (lacks_bound(t)) parts = most_urgent(task_set);
+  }
+  for (; !parts.empty(); parts.pop_back()) {
+    if (std::none_of(parts.back().tasks.begin(), parts.back().tasks.end(), lacks_bound)) break;
+    const auto part = std::make_shared<const MostUrgent>(std::move(parts.back()));
+    for (const Method &method : methods) {
+      if (method.subject == Subject::TaskSet || method.is_paper()) continue;
+      const MethodReport found = run(part->task_set, method, limits);
+      if (!found.trusted) continue;
+      const auto keep = [&](Tightest &best, const ResponseBound &bound) {
+        if (!bound.response || (best.response && *best.response <= *bound.response)) return;
+        best = Tightest{bound.response, &method, in_whole(*part, bound), part};
+      };
+      const Bound &bound = *found.bound();
+      for (std::size_t i = 0; i < bound.tasks.size(); ++i) keep(report.tasks[part->tasks[i]], bound.tasks[i]);
+      for (std::size_t d = 0; d < bound.dags.size(); ++d) {
+        const bool is_kept = part->task_set.dags[d].tasks.size() == task_set.dags[d].tasks.size();
+        if (is_kept) keep(report.dags[d], bound.dags[d]);
+      }
+    }
+  }
 }
 
 Bound apply_itemised(const TaskSet &task_set, const Method &method, std::vector<std::uint32_t> units) {
@@ -75,6 +104,11 @@ Report report_of(const TaskSet &task_set, const std::vector<Method> &methods, co
     if (last.bound()->accepts == true) report.by.push_back(&method);
   }
 
+  Effort::Limits limits;
+  limits.steps = options.effort;
+  limits.itemised.which = options.itemise ? Itemised::Which::All : Itemised::Which::None;
+  bound_alone(task_set, methods, limits, report);
+
   if (verdict(task_set, combine(report.tasks, report.dags)) == Verdict::Schedulable) {
     for (const Tightest &best : report.tasks) {
       if (best.method != nullptr && std::find(report.by.begin(), report.by.end(), best.method) == report.by.end()) {
@@ -100,13 +134,21 @@ Report analyze(const TaskSet &task_set, std::vector<Method> methods, const Analy
 }
 
 ResponseBound itemised(const TaskSet &task_set, const Tightest &tightest, TaskId task) {
+  if (tightest.part != nullptr) {
+    const MostUrgent &part = *tightest.part;
+    const auto place = std::find(part.tasks.begin(), part.tasks.end(), task.value) - part.tasks.begin();
+    const auto own = static_cast<std::size_t>(place);
+    const Bound bound = apply_itemised(part.task_set, *tightest.method, {part.task_set.tasks[own].unit});
+    return in_whole(part, bound.tasks[own]);
+  }
   const Bound bound = apply_itemised(task_set, *tightest.method, {task_set.tasks[task.value].unit});
   return bound.tasks[task.value];
 }
 
 ResponseBound itemised(const TaskSet &task_set, const Tightest &tightest, DagId dag) {
-  const Bound bound = apply_itemised(task_set, *tightest.method, task_set.dags[dag.value].units);
-  return bound.dags[dag.value];
+  const TaskSet &among = tightest.part != nullptr ? tightest.part->task_set : task_set;
+  const Bound bound = apply_itemised(among, *tightest.method, among.dags[dag.value].units);
+  return tightest.part != nullptr ? in_whole(*tightest.part, bound.dags[dag.value]) : bound.dags[dag.value];
 }
 
 Bound tightest_of(const Report &report) { return combine(report.tasks, report.dags); }

@@ -11,6 +11,7 @@
 
 #include "redag_analysis/core/bound.hpp"
 #include "redag_analysis/core/effort.hpp"
+#include "redag_analysis/core/most_urgent.hpp"
 
 namespace redag::analysis {
 
@@ -29,6 +30,7 @@ struct Tightest {
   std::optional<Duration> response;
   const Method *method = nullptr;  // null: no trusted method gave one
   ResponseBound bound;
+  std::shared_ptr<const MostUrgent> part{};  // the tasks among which the method gave it; null: all
 };
 
 struct Report {
@@ -61,7 +63,8 @@ struct AnalyzeOptions {
   bool itemise = false;
 };
 
-/// Runs methods(). Memory is linear in the size of the task set unless it itemises. A method that is ended counts as
+/// Runs methods(). If a task has no bound, runs them again on the most urgent tasks alone (most_urgent.hpp), for the
+/// bounds of these. Memory is linear in the size of the task set unless it itemises. A method that is ended counts as
 /// NotApplicable with `gave_up`; this does not affect the others.
 [[nodiscard]] Report analyze(const TaskSet &task_set, const AnalyzeOptions &options = {});
 /// Runs these methods alone; the report keeps them.

@@ -86,6 +86,18 @@ Bound from_units(const TaskSet &task_set, std::vector<ResponseBound> units) {
   return bound;
 }
 
+Bound from_tasks(const TaskSet &task_set, std::vector<ResponseBound> tasks) {
+  Bound bound;
+  for (ResponseBound &task : tasks) bound.tasks.push_back(if_bounded(std::move(task)));
+  for (const CompiledDag &dag : task_set.dags) {
+    const auto last = std::max_element(dag.tasks.begin(), dag.tasks.end(), [&](std::uint32_t a, std::uint32_t b) {
+      return bound.tasks[a].response.value_or(kNever) < bound.tasks[b].response.value_or(kNever);
+    });
+    bound.dags.push_back(last == dag.tasks.end() ? ResponseBound{} : bound.tasks[*last]);
+  }
+  return bound;
+}
+
 const Method *find_method(std::string_view name) {
   for (const Method &method : methods()) {
     if (method.name == name) return &method;

@@ -114,6 +114,9 @@ enum class Verdict : std::uint8_t { Schedulable, NotShown };
 /// and a DAG with its last unit.
 [[nodiscard]] Bound from_units(const TaskSet &task_set, std::vector<ResponseBound> units);
 
+/// from_tasks() gives each DAG the bound of its task that ends last. If some task has no bound, neither has the DAG.
+[[nodiscard]] Bound from_tasks(const TaskSet &task_set, std::vector<ResponseBound> tasks);
+
 /// Every method, in the order in which a report shows them. To add one, add a file pair and a line in methods.cpp.
 [[nodiscard]] const std::vector<Method> &methods();
 /// Finds a method of methods() by name; null for an unknown name.

@@ -68,30 +68,25 @@ class Resolver {
       : task_set_(task_set), alone_(task_set), apply_(apply) {
     take_away();
     absent_.resize(task_set.units.size());
-    responses_.resize(task_set.units.size());
-    for (std::uint32_t u = 0; u < task_set.units.size(); ++u) responses_[u] = task_set.units[u].length;
+    for (const CompiledTask &task : task_set.tasks) responses_.emplace_back(task.wcet);
   }
 
   Outcome run() {
-    gaps_.assign(task_set_.units.size(), std::nullopt);
+    gaps_.assign(task_set_.tasks.size(), std::nullopt);
     for (int round = 0; update_waits(round); ++round) {
       Outcome outcome = apply_(alone_);
       const Bound *bound = std::get_if<Bound>(&outcome);
       if (bound == nullptr) return outcome;
       found_ = *bound;
-      for (std::uint32_t u = 0; u < task_set_.units.size(); ++u) {
-        responses_[u] = absent_[u].empty() ? of_unit(u).response : std::nullopt;
+      for (std::uint32_t t = 0; t < task_set_.tasks.size(); ++t) {
+        responses_[t] = absent_[task_set_.tasks[t].unit].empty() ? found_.tasks[t].response : std::nullopt;
       }
-      gaps_.assign(task_set_.units.size(), std::nullopt);
+      gaps_.assign(task_set_.tasks.size(), std::nullopt);
     }
     return result();
   }
 
  private:
-  [[nodiscard]] const ResponseBound &of_unit(std::uint32_t u) const {
-    return found_.tasks[task_set_.units[u].tasks.front()];
-  }
-
   void take_away() {
     alone_.threads_suffice_if_bounded = false;
     if (task_set_.threads_suffice_if_bounded) alone_.platform.max_started = 0;
@@ -148,18 +143,18 @@ class Resolver {
     return first_of(u).data && !awaits.empty() && task_set_.tasks[awaits.front()].clock != first_of(u).clock;
   }
 
-  // In each interval (t, t + gap] a job of the unit completes; kUnbounded if nothing says so.
-  Duration gap_of(std::uint32_t u) {
-    if (gaps_[u]) return *gaps_[u];
-    const Unit &unit = task_set_.units[u];
+  // In each interval (t, t + gap] a job of the task completes; kUnbounded if nothing says so.
+  Duration gap_of(std::uint32_t t) {
+    if (gaps_[t]) return *gaps_[t];
+    const std::uint32_t u = task_set_.tasks[t].unit;
     Duration gap = 0;
     if (joins_clocks(u)) {
-      for (const std::uint32_t p : unit.awaits) gap = std::max(gap, gap_of(task_set_.tasks[p].unit));
-      gap = add(gap, found_.tasks.empty() ? unit.length : from_ready(u));
+      for (const std::uint32_t p : task_set_.units[u].awaits) gap = std::max(gap, gap_of(p));
+      gap = add(gap, found_.tasks.empty() ? task_set_.units[u].length : from_ready(t));
     } else {
-      gap = first_of(u).has_gaps || !responses_[u] ? kUnbounded : add(unit.period, *responses_[u]) - 1;
+      gap = first_of(u).has_gaps || !responses_[t] ? kUnbounded : add(task_set_.units[u].period, *responses_[t]) - 1;
     }
-    gaps_[u] = gap;
+    gaps_[t] = gap;
     return gap;
   }
 
@@ -172,9 +167,9 @@ class Resolver {
     for (const std::uint32_t p : task_set_.units[u].awaits) {
       const CompiledTask &before = task_set_.tasks[p];
       if (before.period < first.period) {
-        between = std::max(between, gap_of(before.unit));
+        between = std::max(between, gap_of(p));
       } else if (first.data || is_released_with(before, first)) {
-        seen = std::max(seen, *responses_[before.unit]);
+        seen = std::max(seen, *responses_[p]);
       } else {
         absent_[u] = kNoOrder;
         return std::nullopt;
@@ -200,7 +195,7 @@ class Resolver {
         absent_[u] = kFasterThanData;
         return std::nullopt;
       }
-      const std::optional<Duration> response = responses_[before.unit];
+      const std::optional<Duration> response = responses_[p];
       if (!response) {
         absent_[u] = kNoData;
         return std::nullopt;
@@ -241,8 +236,8 @@ class Resolver {
   Outcome result() {
     const bool all = std::all_of(responses_.begin(), responses_.end(), [](const auto &r) { return r.has_value(); });
     if (task_set_.threads_suffice_if_bounded && !all) return nothing(kFewThreads);
-    for (std::uint32_t u = 0; u < task_set_.units.size(); ++u) {
-      if (conditional_[task_set_.units[u].dag.value] && !responses_[u]) return nothing(kBinds);
+    for (std::uint32_t t = 0; t < task_set_.tasks.size(); ++t) {
+      if (conditional_[task_set_.tasks[t].dag.value] && !responses_[t]) return nothing(kBinds);
     }
     Bound bound = found_;
     for (std::uint32_t u = 0; u < task_set_.units.size(); ++u) {
@@ -263,23 +258,25 @@ class Resolver {
     return from_units(task_set_, std::vector<ResponseBound>(task_set_.units.size(), none));
   }
 
-  // The longest time from the first task's readiness to the end of the unit. Further timers of the unit can be seen
-  // later than that task; the unit's window then need not have begun at its readiness.
-  [[nodiscard]] Duration from_ready(std::uint32_t u) const {
-    const ResponseBound &bound = of_unit(u);
+  // The longest time from the readiness of its unit's first task to the end of the task. Further timers of the unit can
+  // be seen later than that task; the window then need not have begun at its readiness.
+  [[nodiscard]] Duration from_ready(std::uint32_t t) const {
+    const ResponseBound &bound = found_.tasks[t];
+    const std::uint32_t u = task_set_.tasks[t].unit;
     const std::vector<std::uint32_t> &tasks = task_set_.units[u].tasks;
-    const bool is_seen_later = std::any_of(tasks.begin() + 1, tasks.end(), [&](std::uint32_t t) {
-      return !task_set_.tasks[t].data && task_set_.tasks[t].jitter > 0;
+    const bool is_seen_later = std::any_of(tasks.begin() + 1, tasks.end(), [&](std::uint32_t other) {
+      return !task_set_.tasks[other].data && task_set_.tasks[other].jitter > 0;
     });
     if (is_seen_later) return *bound.response;
     // A timer's jitter also counts the time that the machine can take during the response.
     return add(std::max(bound.from_ready, *bound.response - alone_.units[u].jitter), task_set_.frozen);
   }
 
-  // Returns the unit's bound for the given `response`: one Wait term replaces the jitter and covers the time before
+  // Returns the task's bound for the given `response`: one Wait term replaces the jitter and covers the time before
   // readiness.
-  [[nodiscard]] ResponseBound with_wait(std::uint32_t u, Duration response) const {
-    ResponseBound bound = of_unit(u);
+  [[nodiscard]] ResponseBound with_wait(std::uint32_t t, Duration response) const {
+    ResponseBound bound = found_.tasks[t];
+    const std::uint32_t u = task_set_.tasks[t].unit;
     std::erase_if(bound.terms, [](const Term &term) { return term.kind == Term::Kind::Jitter; });
     const Duration wait = response - (*bound.response - alone_.units[u].jitter);
     const TaskId first(task_set_.units[u].tasks.front());
@@ -296,7 +293,7 @@ class Resolver {
         task = ResponseBound{};
         task.absent = absent_[u];
       } else if (task.response) {
-        task = if_bounded(with_wait(u, task_set_.tasks[t].data ? from_ready(u) : *task.response));
+        task = if_bounded(with_wait(t, task_set_.tasks[t].data ? from_ready(t) : *task.response));
       }
     }
   }
@@ -307,69 +304,68 @@ class Resolver {
     if (ages_[u]) return *ages_[u];
     Duration age = 0;
     for (const std::uint32_t p : task_set_.units[u].awaits) {
-      const std::uint32_t before = task_set_.tasks[p].unit;
       Duration since = 0;
       if (joins_clocks(u)) {
-        since = std::min(oldest(before), add(at_most_after(before), longest_other(u, p)));
+        since = std::min(oldest(p), add(at_most_after(p), longest_other(u, p)));
       } else if (!is_released_with(task_set_.tasks[p], first_of(u))) {
-        since = oldest(before);
+        since = oldest(p);
       }
-      age = std::max(age, add(age_of(before), since));
+      age = std::max(age, add(age_of(task_set_.tasks[p].unit), since));
     }
     ages_[u] = age;
     return age;
   }
 
-  // The longest time from the point that age_of() counts to, to the end of the unit.
-  [[nodiscard]] Duration at_most_after(std::uint32_t u) const {
-    return joins_clocks(u) ? from_ready(u) : *responses_[u];
+  // The longest time from the point that age_of() counts to, to the end of the task.
+  [[nodiscard]] Duration at_most_after(std::uint32_t t) const {
+    return joins_clocks(task_set_.tasks[t].unit) ? from_ready(t) : *responses_[t];
   }
 
   // A datum that is taken waits for data of the other predecessors, for the next of each at most.
   Duration longest_other(std::uint32_t u, std::uint32_t predecessor) {
     Duration longest = 0;
     for (const std::uint32_t p : task_set_.units[u].awaits) {
-      if (p != predecessor) longest = std::max(longest, gap_of(task_set_.tasks[p].unit));
+      if (p != predecessor) longest = std::max(longest, gap_of(p));
     }
     return longest;
   }
 
   // The greatest age of a predecessor's latest datum. The next one arrives later, or at the same instant after it.
-  Duration oldest(std::uint32_t u) { return joins_clocks(u) ? gap_of(u) : add(gap_of(u), 1); }
+  Duration oldest(std::uint32_t t) { return joins_clocks(task_set_.tasks[t].unit) ? gap_of(t) : add(gap_of(t), 1); }
 
   ResponseBound end_to_end(std::uint32_t dag) {
     ResponseBound worst;
-    for (const std::uint32_t u : task_set_.dags[dag].units) {
-      const Unit &unit = task_set_.units[u];
-      if (!responses_[u] || !absent_[u].empty()) {
+    for (const std::uint32_t t : task_set_.dags[dag].tasks) {
+      const std::uint32_t u = task_set_.tasks[t].unit;
+      if (!responses_[t]) {
         worst = ResponseBound{};
-        worst.absent = absent_[u].empty() ? of_unit(u).absent : absent_[u];
+        worst.absent = absent_[u].empty() ? found_.tasks[t].absent : absent_[u];
         return worst;
       }
-      ResponseBound bound = of_unit(u);
-      if (!unit.awaits.empty()) {
-        const Duration response = since_origin(u);
+      ResponseBound bound = found_.tasks[t];
+      if (!task_set_.units[u].awaits.empty()) {
+        const Duration response = since_origin(t);
         if (response >= kUnbounded) {
           worst = ResponseBound{};
           worst.absent = kNoAge;
           return worst;
         }
-        bound = with_wait(u, response);
+        bound = with_wait(t, response);
       }
       if (!worst.response || *bound.response > *worst.response) worst = bound;
     }
     return worst;
   }
 
-  // From the release of the earliest data behind a job of the unit to its end.
-  Duration since_origin(std::uint32_t u) {
-    if (joins_clocks(u)) return add(from_ready(u), age_of(u));
+  // From the release of the earliest data behind a job of the task to its end.
+  Duration since_origin(std::uint32_t t) {
+    const std::uint32_t u = task_set_.tasks[t].unit;
+    if (joins_clocks(u)) return add(from_ready(t), age_of(u));
     Duration longest = 0;
     for (const std::uint32_t p : task_set_.units[u].awaits) {
-      const std::uint32_t before = task_set_.tasks[p].unit;
       const bool is_on_grid = is_released_with(task_set_.tasks[p], first_of(u));
-      const Duration since_data = is_on_grid ? *responses_[u] : add(from_ready(u), oldest(before));
-      longest = std::max(longest, add(since_data, age_of(before)));
+      const Duration since_data = is_on_grid ? *responses_[t] : add(from_ready(t), oldest(p));
+      longest = std::max(longest, add(since_data, age_of(task_set_.tasks[p].unit)));
     }
     return longest;
   }
@@ -378,10 +374,10 @@ class Resolver {
   TaskSet alone_;  // without rate edges; the jitter of a waiting unit includes its wait
   Outcome (*apply_)(const TaskSet &);
   std::vector<bool> conditional_;                   // by DagId: its max_active was removed
-  std::vector<std::optional<Duration>> responses_;  // by unit
+  std::vector<std::optional<Duration>> responses_;  // by TaskId
   std::vector<std::string_view> absent_;            // by unit: why it has no wait
-  std::vector<std::optional<Duration>> ages_;
-  std::vector<std::optional<Duration>> gaps_;  // by unit; of the latest round
+  std::vector<std::optional<Duration>> ages_;       // by unit
+  std::vector<std::optional<Duration>> gaps_;       // by TaskId; of the latest round
   Bound found_;
 };
 

@@ -15,9 +15,11 @@
 #include "redag_analysis/many_workers/global_dag.hpp"
 #include "redag_analysis/many_workers/global_groups.hpp"
 #include "redag_analysis/many_workers/global_sequential.hpp"
+#include "redag_analysis/many_workers/suspension_aware.hpp"
 #include "redag_analysis/one_worker/response_time.hpp"
 #include "redag_testing/bound_property.hpp"
 #include "redag_testing/builders.hpp"
+#include "redag_testing/random_workloads.hpp"
 #include "redag_testing/repository.hpp"
 
 namespace redag::analysis {
@@ -115,6 +117,25 @@ TEST(BoundProperty, RatesDagNonpreemptive) {
 
 TEST(BoundProperty, RatesDagNonpreemptiveMaxActive) {
   expect_bound_holds(dag_nonpreemptive(), cases(with_max_active(rates(sched::Preemption::None, 4))), kFew);
+}
+
+testing::BoundGenerator with_waits(const BoundCaseLimits &limits) {
+  return [limits](Rng &rng) {
+    BoundCase bound_case = testing::random_bound_case(rng, limits);
+    testing::add_waits(rng, bound_case.workload);
+    return bound_case;
+  };
+}
+
+TEST(BoundProperty, RatesOfTasksThatWait) {
+  BoundCaseLimits limits = rates(sched::Preemption::Full, 3);
+  limits.max_utilization = 0.5;
+  expect_bound_holds(suspension_aware(), with_waits(limits), kFew);
+  limits.preemption = sched::Preemption::None;
+  expect_bound_holds(suspension_aware(), with_waits(limits), kFew);
+  limits = rates(sched::Preemption::Full, 1);
+  limits.max_utilization = 0.5;
+  expect_bound_holds(dag_one_worker_preemptive(), with_waits(limits), kFew);
 }
 
 TEST(BoundProperty, RatesDagGroups) {

@@ -53,23 +53,25 @@ class Compiler {
     for (const CompiledTask &task : task_set_.tasks) {
       task_set_.utilization += static_cast<double>(task.wcet - task.waits) / static_cast<double>(task.period);
     }
+    refuse_tasks(task_set_);
     check_sums();
     check_threads();
     separate_modes();
     if (lost_.per_second >= kSecond) refuse("stalls, releases and preemptions leave no processor time");
     task_set_.has_modes = task_set_.not_analysable.empty() && !modes_.empty() && waits_.empty();
     if (!modes_.empty()) refuse(std::move(modes_));
-    if (!waits_.empty()) {
-      refuse(why_waits_are_not_covered(task_set_));
-      task_set_.has_waits = task_set_.not_analysable.empty();
-      refuse("jobs wait without a worker");
-    }
+    refuse_waits(task_set_);
     return std::move(task_set_);
   }
 
  private:
   void refuse(std::string reason) {
+    task_set_.is_refused_whole = true;
     if (task_set_.not_analysable.empty()) task_set_.not_analysable = std::move(reason);
+  }
+
+  static void refuse(CompiledTask &task, std::string reason) {
+    if (task.refusal.empty()) task.refusal = std::move(reason);
   }
 
   // True if preemptions count as time in which nothing runs, as stalls and the release timer do. On several workers the
@@ -140,7 +142,9 @@ class Compiler {
     compiled.name = dag.name;
     compiled.deadline = dag.deadline;
     compiled.high = dag.criticality == Criticality::High;
-    if (dag.max_active < dag.tasks.size()) compiled.max_active = dag.max_active;
+    std::uint64_t at_once = 0;
+    for (const Task &task : dag.tasks) at_once += task.concurrency;
+    if (dag.max_active < at_once) compiled.max_active = dag.max_active;
     const auto first = static_cast<std::uint32_t>(task_set_.tasks.size());
     std::uint64_t waiting = 0;
     for (const Task &task : dag.tasks) {
@@ -152,7 +156,10 @@ class Compiler {
       for (const std::uint32_t p : task_set_.tasks[t].predecessors) task_set_.tasks[p].successors.push_back(t);
     }
     if (dag.max_pending > 0 && dag.max_pending < waiting) {
-      refuse("DAG '" + dag.name + "': max_pending can cause jobs to be skipped although every deadline is met");
+      for (std::uint32_t t = first; t < task_set_.tasks.size(); ++t) {
+        refuse(task_set_.tasks[t],
+               "DAG '" + dag.name + "': max_pending can cause jobs to be skipped although every deadline is met");
+      }
     }
     task_set_.dags.push_back(std::move(compiled));
   }
@@ -216,13 +223,13 @@ class Compiler {
       compiled.last_region = whole ? add(task.wcet, lead) : (task.wcet - 1) % task.region + 1;
     }
     if (task.concurrency > 1) {
-      refuse("task '" + compiled.name + "': jobs of a task with concurrency above 1 can overlap");
+      refuse(compiled, "task '" + compiled.name + "': jobs of a task with concurrency above 1 can overlap");
     }
     if (task.budget > 0 && task.budget < task.wcet && task.on_budget != OnBudget::Log) {
-      refuse("task '" + compiled.name + "': its budget is below its wcet, so jobs can be " +
-             (task.on_budget == OnBudget::Abort    ? "cut off"
-              : task.on_budget == OnBudget::Demote ? "demoted"
-                                                   : "skipped"));
+      refuse(compiled, "task '" + compiled.name + "': its budget is below its wcet, so jobs can be " +
+                           (task.on_budget == OnBudget::Abort    ? "cut off"
+                            : task.on_budget == OnBudget::Demote ? "demoted"
+                                                                 : "skipped"));
     }
     if (task.wcet_low > 0 && task.wcet_low < task.wcet) {
       modes_ = "task '" + compiled.name +
@@ -379,40 +386,8 @@ class Compiler {
       const auto id = static_cast<std::uint32_t>(task_set_.units.size());
       for (const std::uint32_t t : tasks) task_set_.tasks[t].unit = id;
       task_set_.dags[dag].units.push_back(id);
-      task_set_.units.push_back(make_unit(DagId(dag), std::move(tasks)));
+      task_set_.units.push_back(make_unit(task_set_, DagId(dag), std::move(tasks)));
     }
-  }
-
-  [[nodiscard]] Unit make_unit(DagId dag, std::vector<std::uint32_t> tasks) const {
-    const CompiledTask &first = task_set_.tasks[tasks.front()];
-    Unit unit;
-    unit.dag = dag;
-    unit.period = first.period;
-    unit.deadline = first.deadline;
-    unit.offset = first.offset;
-    for (const std::uint32_t p : first.predecessors) {
-      if (std::find(tasks.begin(), tasks.end(), p) == tasks.end()) unit.awaits.push_back(p);
-    }
-    unit.limit = tasks.size() > 1 || !unit.awaits.empty() ? first.period : first.limit;
-    unit.first_rank = unit.last_rank = first.rank;
-    std::map<std::uint32_t, Duration> path;  // longest path that ends with the task
-    for (const std::uint32_t t : tasks) {
-      const CompiledTask &task = task_set_.tasks[t];
-      unit.deadline = std::min(unit.deadline, task.deadline);
-      unit.jitter = std::max(unit.jitter, task.data ? 0 : task.jitter);
-      unit.volume = add(unit.volume, task.wcet);
-      unit.first_rank = std::min(unit.first_rank, task.rank);
-      unit.last_rank = std::max(unit.last_rank, task.rank);
-      unit.has_edges = unit.has_edges || !task.predecessors.empty();
-      Duration before = 0;
-      for (const std::uint32_t p : task.predecessors) before = std::max(before, path[p]);
-      path[t] = add(before, task.wcet);
-      unit.length = std::max(unit.length, path[t]);
-    }
-    const Duration end_to_end = task_set_.dags[dag.value].deadline;
-    if (end_to_end > 0) unit.deadline = std::min(unit.deadline, end_to_end);
-    unit.tasks = std::move(tasks);
-    return unit;
   }
 
   std::string modes_;  // why there is a HI mode
@@ -425,6 +400,52 @@ class Compiler {
 };
 
 }  // namespace
+
+void refuse_tasks(TaskSet &task_set) {
+  for (const CompiledTask &task : task_set.tasks) {
+    if (task_set.not_analysable.empty()) task_set.not_analysable = task.refusal;
+  }
+}
+
+void refuse_waits(TaskSet &task_set) {
+  const auto waits = [](const CompiledTask &task) { return task.wake_ups > 0; };
+  if (std::none_of(task_set.tasks.begin(), task_set.tasks.end(), waits) || !task_set.not_analysable.empty()) return;
+  task_set.not_analysable = why_waits_are_not_covered(task_set);
+  task_set.has_waits = task_set.not_analysable.empty();
+  if (task_set.has_waits) task_set.not_analysable = "jobs wait without a worker";
+}
+
+Unit make_unit(const TaskSet &task_set, DagId dag, std::vector<std::uint32_t> tasks) {
+  const CompiledTask &first = task_set.tasks[tasks.front()];
+  Unit unit;
+  unit.dag = dag;
+  unit.period = first.period;
+  unit.deadline = first.deadline;
+  unit.offset = first.offset;
+  for (const std::uint32_t p : first.predecessors) {
+    if (std::find(tasks.begin(), tasks.end(), p) == tasks.end()) unit.awaits.push_back(p);
+  }
+  unit.limit = tasks.size() > 1 || !unit.awaits.empty() ? first.period : first.limit;
+  unit.first_rank = unit.last_rank = first.rank;
+  std::map<std::uint32_t, Duration> path;  // longest path that ends with the task
+  for (const std::uint32_t t : tasks) {
+    const CompiledTask &task = task_set.tasks[t];
+    unit.deadline = std::min(unit.deadline, task.deadline);
+    unit.jitter = std::max(unit.jitter, task.data ? 0 : task.jitter);
+    unit.volume = add(unit.volume, task.wcet);
+    unit.first_rank = std::min(unit.first_rank, task.rank);
+    unit.last_rank = std::max(unit.last_rank, task.rank);
+    unit.has_edges = unit.has_edges || !task.predecessors.empty();
+    Duration before = 0;
+    for (const std::uint32_t p : task.predecessors) before = std::max(before, path[p]);
+    path[t] = add(before, task.wcet);
+    unit.length = std::max(unit.length, path[t]);
+  }
+  const Duration end_to_end = task_set.dags[dag.value].deadline;
+  if (end_to_end > 0) unit.deadline = std::min(unit.deadline, end_to_end);
+  unit.tasks = std::move(tasks);
+  return unit;
+}
 
 AnalysisPlatform charge(AnalysisPlatform platform, const Overheads &overheads) {
   platform.dispatch_overhead = overheads.dispatch;

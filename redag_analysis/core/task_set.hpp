@@ -102,6 +102,7 @@ struct CompiledTask {
   std::uint32_t group = kNoGroup;  // only groups that two or more tasks share
   bool data = false;               // released by its predecessors' completion
   std::uint32_t clock = 0;         // what its grid counts from; see is_released_with()
+  std::string refusal;             // why no bound covers it; empty: nothing speaks against it
   bool has_gaps = false;           // its grid is that of events: the points are T apart, or any time more
   std::vector<std::uint32_t> predecessors;  // TaskIds
   std::vector<std::uint32_t> successors;    // TaskIds
@@ -159,6 +160,8 @@ struct TaskSet {
   /// Features that no bound covers, such as a budget below the wcet or a queue that is too small. Every method then
   /// answers NotApplicable with this reason.
   std::string not_analysable;
+  /// not_analysable is a reason for all tasks, not CompiledTask::refusal of some, nor waits.
+  bool is_refused_whole = false;
   /// There are fewer threads than tasks, but enough if every response is within its period (jobs_in_progress.hpp).
   bool threads_suffice_if_bounded = false;
   /// Some wcet_low is below its wcet: there is a HI mode, and not_analysable has no other reason. Methods that know
@@ -183,6 +186,13 @@ struct TaskSet {
   [[nodiscard]] bool has_edges() const;       // some unit has edges
   [[nodiscard]] bool has_rate_edges() const;  // some unit awaits data of another
 };
+
+/// refuse_tasks() and refuse_waits() set what not_analysable and has_waits say of the tasks, unless it has a reason.
+void refuse_tasks(TaskSet &task_set);
+void refuse_waits(TaskSet &task_set);
+
+/// make_unit() measures these tasks of the DAG, which stand in topological order, as one unit.
+[[nodiscard]] Unit make_unit(const TaskSet &task_set, DagId dag, std::vector<std::uint32_t> tasks);
 
 /// Compiles a workload. Fails where validate() finds an error (set the periods of data tasks first: inherit_periods()),
 /// and for a platform with clusters, without workers or with negative overheads. O(n log n + edges).

@@ -75,8 +75,6 @@ std::string why_waits_are_not_covered(const TaskSet &task_set) {
   }
   if (task_set.platform.max_started > 0 && task_set.platform.max_started < task_set.tasks.size())
     return "callbacks that wait (segments) have bounds only with as many threads as tasks";
-  if (task_set.has_rate_edges())
-    return "callbacks that wait (segments) have bounds only if no task takes data of a task with another period";
   for (const CompiledDag &dag : task_set.dags) {
     if (dag.max_active > 0 && dag.units.size() > 1)
       return "DAG '" + dag.name + "': a job that waits counts for max_active";

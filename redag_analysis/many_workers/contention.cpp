@@ -56,7 +56,7 @@ void Contention::find_demands(GlobalUnit &unit) {
   const auto longest = [&](auto time_of) {
     std::vector<Duration> until(task_set_.tasks.size(), 0);
     Duration most = 0;
-    for (const std::uint32_t t : compiled.tasks) {
+    for (const std::uint32_t t : paths_of(compiled)) {
       Duration before = 0;
       for (const std::uint32_t p : task_set_.tasks[t].predecessors) before = std::max(before, until[p]);
       until[t] = add(before, time_of(t));
@@ -66,8 +66,9 @@ void Contention::find_demands(GlobalUnit &unit) {
   };
   for (std::size_t r = 0; r < resources_.size(); ++r) {
     Demand &demand = demands[r];
+    demand = Demand{};
     std::uint32_t requests = 0;
-    for (const std::uint32_t t : compiled.tasks) {
+    for (const std::uint32_t t : tasks_of(compiled)) {
       const Use &use = uses_[t][r];
       demand.work.volume = add(demand.work.volume, use.time);
       demand.ahead = add(demand.ahead, use.longest);
@@ -159,8 +160,9 @@ Contention::Path Contention::heaviest_path(const Unit &unit) const {
   const std::vector<Demand> &own = demands_[units_[k_].unit];
   std::vector<Int128> until(task_set_.tasks.size(), 0);
   std::vector<std::uint32_t> from(task_set_.tasks.size(), kNoGroup);
-  std::uint32_t last = unit.tasks.front();
-  for (const std::uint32_t t : unit.tasks) {
+  const std::vector<std::uint32_t> &tasks = paths_of(unit);
+  std::uint32_t last = tasks.front();
+  for (const std::uint32_t t : tasks) {
     const CompiledTask &task = task_set_.tasks[t];
     Int128 weight = scale_ * task.elsewhere;
     if (cap_ > 0) weight -= share(task.elsewhere, cap_);
@@ -197,7 +199,7 @@ void Contention::open(std::size_t k) {
   apart_ = elsewhere_[unit.unit];
   together_ = heaviest_path(compiled).weight;
   if (cap_ > 0) {
-    for (const std::uint32_t t : compiled.tasks) together_ += share(task_set_.tasks[t].elsewhere, cap_);
+    for (const std::uint32_t t : tasks_of(compiled)) together_ += share(task_set_.tasks[t].elsewhere, cap_);
   }
   for (std::size_t r = 0; r < resources_.size(); ++r) {
     apart_ = add(apart_, own[r].path);
@@ -260,6 +262,12 @@ Duration Contention::next(Duration window) {
   const Duration whole = saturate(together / scale_);
   is_apart_ = cap_ == 0 && apart <= whole;
   return is_apart_ ? apart : whole;
+}
+
+void Contention::narrow(GlobalUnit &unit, const Part *part) {
+  part_ = part;
+  unit.tasks = static_cast<std::uint32_t>(tasks_of(task_set_.units[unit.unit]).size());
+  find_demands(unit);
 }
 
 bool Contention::respond(std::size_t k, Duration start) {
@@ -326,7 +334,7 @@ void Contention::explain_together(SharedTerms &terms) {
   Duration elsewhere = 0;
   Duration all_elsewhere = 0;
   for (const std::uint32_t t : path.tasks) elsewhere += task_set_.tasks[t].elsewhere;
-  for (const std::uint32_t t : compiled.tasks) all_elsewhere += task_set_.tasks[t].elsewhere;
+  for (const std::uint32_t t : tasks_of(compiled)) all_elsewhere += task_set_.tasks[t].elsewhere;
   terms.add(Term::Kind::Suspended, unit, elsewhere);
   if (cap_ > 0) terms.add_share(Term::Kind::Own, unit, all_elsewhere - elsewhere, cap_);
   for (std::size_t r = 0; r < resources_.size(); ++r) {

@@ -46,6 +46,9 @@ class Contention {
   /// there is no fixed point.
   [[nodiscard]] bool respond(std::size_t k, Duration start);
 
+  /// narrow() leaves of the unit only this part; null gives back the whole.
+  void narrow(GlobalUnit &unit, const Part *part);
+
   /// The response of units[k], itemised if that is asked for.
   [[nodiscard]] ResponseBound explain(std::size_t k);
 
@@ -64,6 +67,12 @@ class Contention {
 
   void find_uses();
   void find_demands(GlobalUnit &unit);
+  [[nodiscard]] const std::vector<std::uint32_t> &tasks_of(const Unit &unit) const {
+    return part_ ? part_->tasks : unit.tasks;
+  }
+  [[nodiscard]] const std::vector<std::uint32_t> &paths_of(const Unit &unit) const {
+    return part_ ? part_->paths : unit.tasks;
+  }
   void check_sums();
   void make_divisible(std::uint32_t divisor);
   [[nodiscard]] std::uint32_t cap_of(const GlobalUnit &unit) const;
@@ -90,6 +99,7 @@ class Contention {
   std::vector<Duration> elsewhere_;           // by position in TaskSet::units: waits without a device on one path
   std::vector<Duration> works_;               // of units[0 .. k) at one resource in the current window
 
+  const Part *part_ = nullptr;  // what is left of the unit whose window is open; null: all
   // The unit whose window is open.
   std::size_t k_ = 0;
   std::uint32_t cap_ = 0;           // its max_active if it can bind, else 0

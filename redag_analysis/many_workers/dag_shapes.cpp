@@ -175,7 +175,7 @@ Outcome apply_shapes(const TaskSet &task_set) {
         const Duration start = alone ? 0 : view.units[k].response - view.units[k].jitter;
         return respond(view.units, shapes, k, view.workers, start);
       },
-      [&](std::size_t k) { return explain(task_set, view.units, k, view.workers); });
+      [&](std::size_t k) { return explain(task_set, view.units, k, view.workers); }, global::narrows_to_part(task_set));
 }
 
 }  // namespace

@@ -41,7 +41,9 @@ BoundCaseLimits graphs() {
   return limits;
 }
 
-TEST(BoundProperty, DagShapes) { expect_bound_holds(dag_shapes(), cases(graphs()), {.workloads = 2000}); }
+TEST(BoundProperty, DagShapes) {
+  expect_bound_holds(dag_shapes(), cases(graphs()), {.workloads = 2000, .from_source = true});
+}
 
 // Short periods and two workers, from many offsets, where a job that is carried in or cut off matters.
 TEST(BoundProperty, DagShapesAtTheEndsOfWindows) {
@@ -53,7 +55,7 @@ TEST(BoundProperty, DagShapesAtTheEndsOfWindows) {
   limits.max_utilization = 0.9;
   limits.min_period = 6;
   limits.max_period = 30;
-  expect_bound_holds(dag_shapes(), cases(limits), {.workloads = 1000, .runs = 20, .periods = 20});
+  expect_bound_holds(dag_shapes(), cases(limits), {.workloads = 1000, .runs = 20, .periods = 20, .from_source = true});
 }
 
 TEST(BoundProperty, RatesDagShapes) {
@@ -62,7 +64,7 @@ TEST(BoundProperty, RatesDagShapes) {
   limits.max_dags = 3;
   limits.max_tasks = 5;
   limits.max_utilization = 0.5;
-  expect_bound_holds(dag_shapes(), cases(limits), {.workloads = 300, .runs = 6});
+  expect_bound_holds(dag_shapes(), cases(limits), {.workloads = 300, .runs = 6, .from_source = true});
 }
 
 // Tasks of 1, then 4 and 2 in parallel, then 1.

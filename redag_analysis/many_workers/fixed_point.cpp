@@ -3,6 +3,7 @@
 
 #include "redag_analysis/many_workers/fixed_point.hpp"
 
+#include <algorithm>
 #include <cstddef>
 #include <utility>
 
@@ -43,11 +44,34 @@ auto as_last(std::vector<GlobalUnit> &units, Peers peers, std::size_t k, F f) {
 
 }  // namespace
 
+std::function<void(GlobalUnit &, const Part *)> narrows_to_part(const TaskSet &task_set) {
+  return [&task_set](GlobalUnit &unit, const Part *part) {
+    if (part != nullptr) narrow(task_set, *part, unit);
+  };
+}
+
 Bound from_most_urgent(const TaskSet &task_set, std::vector<GlobalUnit> &units,
                        const std::function<void(GlobalUnit &)> &start,
                        const std::function<bool(std::size_t, bool)> &respond,
-                       const std::function<ResponseBound(std::size_t)> &explain) {
+                       const std::function<ResponseBound(std::size_t)> &explain,
+                       const std::function<void(GlobalUnit &, const Part *)> &narrow, bool overlap) {
   std::vector<ResponseBound> responses(task_set.units.size());
+  std::vector<std::pair<std::uint32_t, ResponseBound>> parts;  // by task
+  // Bounds the tasks of the unit at this position. It is bounded, so its instances do not overlap, and a task waits
+  // only for what does not follow it.
+  const auto bound_parts = [&](std::size_t k, bool alone) {
+    const GlobalUnit whole = units[k];
+    for (const std::uint32_t t : task_set.units[whole.unit].tasks) {
+      const Part part = part_until(task_set, t);
+      if (narrow == nullptr || part.paths.size() == whole.tasks) continue;
+      narrow(units[k], &part);
+      start(units[k]);
+      if (respond(k, alone) && units[k].response < whole.response) parts.emplace_back(t, explain(k));
+      units[k] = whole;
+    }
+    if (narrow != nullptr) narrow(units[k], nullptr);
+    units[k] = whole;
+  };
   bool known = true;
   Peers peers;
   for (; peers.begin < units.size(); peers.begin = peers.end) {
@@ -78,11 +102,19 @@ Bound from_most_urgent(const TaskSet &task_set, std::vector<GlobalUnit> &units,
       }
       response = as_last(units, peers, k, [&](std::size_t last) {
         if (!alone && Effort::itemises(units[last].unit)) (void)respond(last, false);  // sets what explain() looks at
-        return explain(last);
+        ResponseBound whole = explain(last);
+        if (units[last].tasks > 1) bound_parts(last, alone);
+        return whole;
       });
     }
+    if (known || !overlap) continue;
+    known = std::all_of(units.begin() + static_cast<std::ptrdiff_t>(peers.begin),
+                        units.begin() + static_cast<std::ptrdiff_t>(peers.end),
+                        [&](GlobalUnit &unit) { return assume_overlap(task_set, unit); });
   }
-  return from_units(task_set, std::move(responses));
+  Bound bound = from_units(task_set, std::move(responses));
+  for (auto &[task, part] : parts) bound.tasks[task] = if_bounded(std::move(part));
+  return bound;
 }
 
 Bound all_that_agree(const TaskSet &task_set, std::vector<GlobalUnit> &units, std::string_view exceeds,

@@ -56,14 +56,21 @@ template <class Next>
 [[nodiscard]] std::string_view agree(std::span<Duration *const> values, std::string_view exceeds,
                                      const std::function<bool(std::size_t k)> &evaluate);
 
+/// A narrow() for from_most_urgent() that only changes the unit.
+[[nodiscard]] std::function<void(GlobalUnit &unit, const Part *part)> narrows_to_part(const TaskSet &task_set);
+
 /// Bounds `units` from the most urgent to the least. respond(k, alone) sets units[k].response from those of units[0 ..
 /// k), and returns false above its limit; explain(k) follows a call of it. Each of several peers (peers_of()) is
 /// treated as the last of them, with `alone` false. Their responses are the least that agree, beginning with those that
-/// start() sets; otherwise none of them has one.
+/// start() sets; otherwise none of them has one. In a unit with a bound each task has one of its own: that of the part
+/// of the unit before its end. narrow() leaves that part of units[k], and null gives back the whole. Below a unit
+/// without a bound none has one, unless `overlap`: then assume_overlap() holds for that unit.
 [[nodiscard]] Bound from_most_urgent(const TaskSet &task_set, std::vector<GlobalUnit> &units,
                                      const std::function<void(GlobalUnit &unit)> &start,
                                      const std::function<bool(std::size_t k, bool alone)> &respond,
-                                     const std::function<ResponseBound(std::size_t k)> &explain);
+                                     const std::function<ResponseBound(std::size_t k)> &explain,
+                                     const std::function<void(GlobalUnit &unit, const Part *part)> &narrow = nullptr,
+                                     bool overlap = false);
 
 /// Applies agree() to the responses of `units`, which respond(k) sets. All units have the bound that explain(k) gives,
 /// or none has; none has if one unit is hopeless.

@@ -4,8 +4,10 @@
 #include "redag_analysis/many_workers/global.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <numeric>
+#include <set>
 
 #include "redag/sched/policy.hpp"
 #include "redag_analysis/core/arithmetic.hpp"
@@ -81,19 +83,16 @@ bool fits(const std::vector<GlobalUnit> &units, std::uint32_t workers) {
   return Int128{longest} * workers < (Int128{1} << 50U) && sum < (Int128{1} << 62U);
 }
 
-// Sets the overhead of the longest path, and the most tasks on any path.
-void measure_paths(const TaskSet &task_set, const Unit &unit, GlobalUnit &result) {
-  if (unit.tasks.size() == 1) {
-    result.path_overhead = task_set.tasks[unit.tasks.front()].overhead;
-    return;
-  }
+// Measures the longest path through these tasks, which stand in topological order, and the most tasks on any path.
+void measure_paths(const TaskSet &task_set, const std::vector<std::uint32_t> &tasks, GlobalUnit &result) {
   struct Path {
     Duration length = 0;
     Duration overhead = 0;
     std::uint32_t tasks = 0;
   };
   std::map<std::uint32_t, Path> paths;
-  for (const std::uint32_t t : unit.tasks) {
+  result.length = result.path_tasks = 0;
+  for (const std::uint32_t t : tasks) {
     const CompiledTask &task = task_set.tasks[t];
     Path longest;
     std::uint32_t most = 0;
@@ -103,7 +102,10 @@ void measure_paths(const TaskSet &task_set, const Unit &unit, GlobalUnit &result
       most = std::max(most, before.tasks);
     }
     const Path path{add(longest.length, task.wcet), add(longest.overhead, task.overhead), most + 1};
-    if (path.length == unit.length) result.path_overhead = path.overhead;
+    if (path.length > result.length) {
+      result.length = path.length;
+      result.path_overhead = path.overhead;
+    }
     result.path_tasks = std::max(result.path_tasks, path.tasks);
     paths[t] = path;
   }
@@ -118,14 +120,13 @@ GlobalUnit unit_of(const TaskSet &task_set, std::uint32_t id) {
   GlobalUnit result;
   result.unit = id;
   result.volume = unit.volume;
-  result.length = unit.length;
   result.period = unit.period;
   result.jitter = unit.jitter;
   result.limit = std::min(unit.limit, unit.period);
   result.tasks = static_cast<std::uint32_t>(unit.tasks.size());
   result.bound = dag.max_active > 0 && dag.max_active < result.tasks ? std::min(dag.max_active, workers) : 0;
   set_width(result, std::min({workers, result.tasks, result.bound > 0 ? result.bound : result.tasks}));
-  measure_paths(task_set, unit, result);
+  measure_paths(task_set, unit.tasks, result);
   return result;
 }
 
@@ -154,6 +155,49 @@ Peers peers_of(const TaskSet &task_set, const std::vector<GlobalUnit> &units, st
   while (peers.begin > 0 && are_equals(task_set, units[peers.begin - 1], units[peers.begin])) --peers.begin;
   while (peers.end < units.size() && are_equals(task_set, units[peers.end - 1], units[peers.end])) ++peers.end;
   return peers;
+}
+
+// Of each task one job may have started, others are queued, and one waits for predecessors. A data task has no more
+// releases than a predecessor has ends, and of those at most that number are of jobs from before the window.
+bool assume_overlap(const TaskSet &task_set, GlobalUnit &unit) {
+  const Unit &compiled = task_set.units[unit.unit];
+  Duration unfinished = 0;
+  for (const std::uint32_t t : compiled.tasks) {
+    unfinished = add(unfinished, std::max<Duration>(1, task_set.tasks[t].limit / compiled.period) + 2);
+  }
+  // One more period for the division, and the volume, which dag_work() takes for done in time.
+  unit.response = add(add(compiled.jitter, multiply(unit.period, unfinished + 1)), compiled.volume);
+  constexpr Duration kLongest = Duration{1} << 44U;
+  constexpr Duration kLargestLoad = 16;
+  const Duration width = task_set.platform.workers;
+  return unit.response < kLongest / width && compiled.volume / compiled.period < kLargestLoad * width;
+}
+
+Part part_until(const TaskSet &task_set, std::uint32_t task) {
+  const std::vector<std::uint32_t> &tasks = task_set.units[task_set.tasks[task].unit].tasks;
+  Part part;
+  std::set<std::uint32_t> after = {task};
+  for (const std::uint32_t t : tasks) {
+    const std::vector<std::uint32_t> &before = task_set.tasks[t].predecessors;
+    const bool follows = std::any_of(before.begin(), before.end(), [&](std::uint32_t p) { return after.contains(p); });
+    if (follows) after.insert(t);
+    if (!follows) part.tasks.push_back(t);
+  }
+  std::set<std::uint32_t> leads = {task};
+  for (std::size_t i = tasks.size(); i-- > 0;) {
+    if (!leads.contains(tasks[i])) continue;
+    leads.insert(task_set.tasks[tasks[i]].predecessors.begin(), task_set.tasks[tasks[i]].predecessors.end());
+  }
+  std::copy_if(tasks.begin(), tasks.end(), std::back_inserter(part.paths),
+               [&](std::uint32_t t) { return leads.contains(t); });
+  return part;
+}
+
+void narrow(const TaskSet &task_set, const Part &part, GlobalUnit &unit) {
+  unit.volume = 0;
+  for (const std::uint32_t t : part.tasks) unit.volume = add(unit.volume, task_set.tasks[t].wcet);
+  unit.tasks = static_cast<std::uint32_t>(part.tasks.size());
+  measure_paths(task_set, part.paths, unit);
 }
 
 bool is_hopeless(const GlobalUnit &unit, std::uint32_t workers) {

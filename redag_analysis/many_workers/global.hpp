@@ -70,6 +70,21 @@ struct Peers {
 /// One unit alone; its place among the others is not determined.
 [[nodiscard]] GlobalUnit unit_of(const TaskSet &task_set, std::uint32_t unit);
 
+/// assume_overlap() sets `response` such that dag_work() holds for a unit without a bound, whose instances can overlap:
+/// by the number of jobs that are released in a window, and of those that can be unfinished when it begins. Returns
+/// false if sums could wrap.
+[[nodiscard]] bool assume_overlap(const TaskSet &task_set, GlobalUnit &unit);
+
+/// What a unit does before one of its tasks ends, if its instances do not overlap.
+struct Part {
+  std::vector<std::uint32_t> tasks;  // TaskIds: all that do not follow the task
+  std::vector<std::uint32_t> paths;  // those that lead to the task, and the task
+};
+[[nodiscard]] Part part_until(const TaskSet &task_set, std::uint32_t task);
+
+/// narrow() leaves of a unit only this part. Its work in the windows of others is not that of the part.
+void narrow(const TaskSet &task_set, const Part &part, GlobalUnit &unit);
+
 /// True if no response is within the limit: there is more work than the workers can do until then. Sums of such a unit
 /// can wrap.
 [[nodiscard]] bool is_hopeless(const GlobalUnit &unit, std::uint32_t workers);
@@ -141,7 +156,7 @@ class SharedTerms {
                                          std::size_t from, std::uint32_t count);
 
 inline constexpr std::string_view kExceedsLimit =
-    "its response time can reach the next release, which would skip a job";
+    "its bound exceeds the time after which the next release would skip a job";
 inline constexpr std::string_view kMoreUrgent = "a more urgent task or DAG has no bound";
 inline constexpr std::string_view kPeer = "a task or DAG of the same priority has no bound";
 inline constexpr std::string_view kNoFixedPoint =

@@ -147,7 +147,8 @@ Bound from_most_urgent(const TaskSet &task_set, global::Units &view, Respond res
         terms.add_jitter();
         bound.terms = terms.take();
         return bound;
-      });
+      },
+      global::narrows_to_part(task_set), true);
 }
 
 Outcome apply_melani(const TaskSet &task_set) {

@@ -43,23 +43,26 @@ BoundCaseLimits with_max_active(BoundCaseLimits limits) {
 }
 
 TEST(BoundProperty, Melani) {
-  expect_bound_holds(melani(), cases(graphs(sched::Preemption::Full)), {.workloads = 2000});
+  expect_bound_holds(melani(), cases(graphs(sched::Preemption::Full)), {.workloads = 2000, .from_source = true});
 }
 
 TEST(BoundProperty, DagBounded) {
-  expect_bound_holds(dag_bounded(), cases(graphs(sched::Preemption::Full)), {.workloads = 1500});
+  expect_bound_holds(dag_bounded(), cases(graphs(sched::Preemption::Full)), {.workloads = 1500, .from_source = true});
 }
 
 TEST(BoundProperty, DagBoundedWithMaxActive) {
-  expect_bound_holds(dag_bounded(), cases(with_max_active(graphs(sched::Preemption::Full))), {.workloads = 2000});
+  expect_bound_holds(dag_bounded(), cases(with_max_active(graphs(sched::Preemption::Full))),
+                     {.workloads = 2000, .from_source = true});
 }
 
 TEST(BoundProperty, DagNonpreemptive) {
-  expect_bound_holds(dag_nonpreemptive(), cases(graphs(sched::Preemption::None)), {.workloads = 1500});
+  expect_bound_holds(dag_nonpreemptive(), cases(graphs(sched::Preemption::None)),
+                     {.workloads = 1500, .from_source = true});
 }
 
 TEST(BoundProperty, DagNonpreemptiveWithMaxActive) {
-  expect_bound_holds(dag_nonpreemptive(), cases(with_max_active(graphs(sched::Preemption::None))), {.workloads = 2000});
+  expect_bound_holds(dag_nonpreemptive(), cases(with_max_active(graphs(sched::Preemption::None))),
+                     {.workloads = 2000, .from_source = true});
 }
 
 // The least responses that agree with each other do not depend on where the rounds begin.
@@ -156,14 +159,14 @@ testing::BoundCase narrow_and_wide_case(Rng &rng, sched::Preemption preemption, 
 TEST(BoundProperty, DagNonpreemptiveNarrowAndWide) {
   for (const bool bounds : {false, true}) {
     const auto generator = [bounds](Rng &rng) { return narrow_and_wide_case(rng, sched::Preemption::None, bounds); };
-    expect_bound_holds(dag_nonpreemptive(), generator, {.workloads = 1500, .periods = 5});
+    expect_bound_holds(dag_nonpreemptive(), generator, {.workloads = 1500, .periods = 5, .from_source = true});
   }
 }
 
 TEST(BoundProperty, DagBoundedNarrowAndWide) {
   for (const bool bounds : {false, true}) {
     const auto generator = [bounds](Rng &rng) { return narrow_and_wide_case(rng, sched::Preemption::Full, bounds); };
-    expect_bound_holds(dag_bounded(), generator, {.workloads = 1000, .periods = 5});
+    expect_bound_holds(dag_bounded(), generator, {.workloads = 1000, .periods = 5, .from_source = true});
   }
 }
 

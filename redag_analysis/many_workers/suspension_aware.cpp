@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "redag_analysis/core/rate_edges.hpp"
 #include "redag_analysis/many_workers/contention.hpp"
 #include "redag_analysis/many_workers/fixed_point.hpp"
 
@@ -39,7 +40,8 @@ Outcome bound_in_order(const TaskSet &task_set) {
       [&](std::size_t k, bool alone) {
         return contention.respond(k, alone ? 0 : view.units[k].response - view.units[k].jitter);
       },
-      [&](std::size_t k) { return contention.explain(k); });
+      [&](std::size_t k) { return contention.explain(k); },
+      [&](GlobalUnit &unit, const global::Part *part) { contention.narrow(unit, part); }, true);
 }
 
 Outcome bound_in_any_order(const TaskSet &task_set) {
@@ -82,7 +84,7 @@ Method suspension_aware() {
           "shared groups",
       .complexity = "pseudo-polynomial; O(DAGs * devices) per step",
       .knows_waits = true,
-      .apply = bound_in_order,
+      .apply = [](const TaskSet &task_set) { return across_rates(task_set, bound_in_order); },
   };
 }
 

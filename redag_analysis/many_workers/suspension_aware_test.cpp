@@ -76,38 +76,40 @@ BoundGenerator with_a_busy_device(BoundCaseLimits limits) {
 }
 
 TEST(BoundProperty, SuspensionAware) {
-  expect_bound_holds(suspension_aware(), with_waits(tasks(sched::Preemption::Full)), {.workloads = 600});
+  expect_bound_holds(suspension_aware(), with_waits(tasks(sched::Preemption::Full)),
+                     {.workloads = 600, .from_source = true});
 }
 
 TEST(BoundProperty, SuspensionAwareDags) {
   BoundCaseLimits limits = graphs(sched::Preemption::Full);
-  expect_bound_holds(suspension_aware(), with_waits(limits), {.workloads = 400});
+  expect_bound_holds(suspension_aware(), with_waits(limits), {.workloads = 400, .from_source = true});
   limits.caps = true;
-  expect_bound_holds(suspension_aware(), with_waits(limits), {.workloads = 400});
+  expect_bound_holds(suspension_aware(), with_waits(limits), {.workloads = 400, .from_source = true});
 }
 
 TEST(BoundProperty, SuspensionAwareNonpreemptive) {
-  expect_bound_holds(suspension_aware(), with_waits(tasks(sched::Preemption::None)), {.workloads = 400});
+  expect_bound_holds(suspension_aware(), with_waits(tasks(sched::Preemption::None)),
+                     {.workloads = 400, .from_source = true});
   BoundCaseLimits limits = graphs(sched::Preemption::None);
-  expect_bound_holds(suspension_aware(), with_waits(limits), {.workloads = 400});
+  expect_bound_holds(suspension_aware(), with_waits(limits), {.workloads = 400, .from_source = true});
   limits.caps = true;
-  expect_bound_holds(suspension_aware(), with_waits(limits), {.workloads = 400});
+  expect_bound_holds(suspension_aware(), with_waits(limits), {.workloads = 400, .from_source = true});
 }
 
 TEST(BoundProperty, SuspensionAwareAtABusyDevice) {
   for (const auto mode : {sched::Preemption::Full, sched::Preemption::None}) {
-    expect_bound_holds(suspension_aware(), with_a_busy_device(tasks(mode)), {.workloads = 400});
+    expect_bound_holds(suspension_aware(), with_a_busy_device(tasks(mode)), {.workloads = 400, .from_source = true});
     BoundCaseLimits limits = graphs(mode);
     limits.caps = true;
-    expect_bound_holds(suspension_aware(), with_a_busy_device(limits), {.workloads = 300});
+    expect_bound_holds(suspension_aware(), with_a_busy_device(limits), {.workloads = 300, .from_source = true});
   }
 }
 
 TEST(BoundProperty, SuspensionAwareOnOneWorker) {
   BoundCaseLimits limits = tasks(sched::Preemption::Full);
   limits.max_workers = 1;
-  expect_bound_holds(suspension_aware(), with_waits(limits), {.workloads = 600});
-  expect_bound_holds(suspension_aware(), with_a_busy_device(limits), {.workloads = 300});
+  expect_bound_holds(suspension_aware(), with_waits(limits), {.workloads = 600, .from_source = true});
+  expect_bound_holds(suspension_aware(), with_a_busy_device(limits), {.workloads = 300, .from_source = true});
 }
 
 TEST(BoundProperty, SuspensionAwareAnyOrder) {

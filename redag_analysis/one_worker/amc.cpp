@@ -55,7 +55,7 @@ Duration low_volume(const TaskSet &task_set, const Unit &unit) {
 
 // One job of the unit in the busy period: R <= T.
 Own own_of(const Unit &unit, Duration volume, Duration blocking) {
-  return Own{volume, unit.period, unit.jitter, std::min(unit.limit, unit.period), blocking, 0};
+  return Own{volume, unit.period, unit.jitter, std::min(unit.limit, unit.period), blocking};
 }
 
 // The units that are more urgent than a unit, in each mode.

@@ -20,6 +20,8 @@ namespace {
 // millionths of one, or with periods many orders of magnitude apart, need more.
 constexpr int kMaxSteps = 1'000'000;
 
+bool steps_ran_out(int steps) { return steps > kMaxSteps; }
+
 template <class Count>
 Duration demand(Int128 start, std::span<const Interferer> more_urgent, Count count) {
   Int128 sum = start;
@@ -44,67 +46,9 @@ bool fixed_point(Int128 start, std::span<const Interferer> more_urgent, Duration
   return false;
 }
 
-FixedPoint none(int steps) { return FixedPoint{std::nullopt, steps > kMaxSteps ? kGaveUp : kExceedsLimit}; }
-
 // The window in which job q must end for its response to be within the limit.
 Duration stop_of(const Own &own, std::int64_t q) {
   return saturate(Int128{own.limit} - own.jitter + Int128{q} * own.period);
-}
-
-// Adds the unit's own waits, and the less urgent service before them.
-void add_waits(const TaskSet &task_set, const Unit &unit, TaskId self, std::vector<Term> &terms) {
-  Duration elsewhere = 0;
-  for (const std::uint32_t t : unit.tasks) elsewhere = add(elsewhere, task_set.tasks[t].elsewhere);
-  if (elsewhere > 0) terms.push_back(Term{Term::Kind::Suspended, self, unit.dag, elsewhere, 0});
-  for (std::size_t d = 0; d < task_set.devices.size(); ++d) {
-    DeviceUse use;
-    for (const std::uint32_t t : unit.tasks) {
-      use.service = add(use.service, task_set.tasks[t].devices[d].service);
-      use.blocked = add(use.blocked, task_set.tasks[t].devices[d].blocked);
-    }
-    if (use.service > 0) terms.push_back(Term{Term::Kind::Suspended, self, unit.dag, use.service, 0, DeviceId(d)});
-    if (use.blocked > 0) terms.push_back(Term{Term::Kind::Blocking, {}, {}, use.blocked, 0, DeviceId(d)});
-  }
-}
-
-std::vector<Term> terms_of(const TaskSet &task_set, const Unit &unit, const View &view,
-                           const std::vector<std::uint32_t> &more_urgent, const Response &response, bool deferred) {
-  Duration overhead = 0;
-  Duration waits = 0;
-  for (const std::uint32_t t : unit.tasks) {
-    overhead = add(overhead, task_set.tasks[t].overhead);
-    waits = add(waits, task_set.tasks[t].waits);
-  }
-  std::vector<Term> terms;
-  const TaskId self = unit.tasks.size() == 1 ? TaskId(unit.tasks.front()) : TaskId();
-  terms.push_back(Term{Term::Kind::Own, self, unit.dag, unit.volume - overhead - waits, 1});
-  if (waits > 0) add_waits(task_set, unit, self, terms);
-  if (overhead > 0) terms.push_back(Term{Term::Kind::Overhead, self, unit.dag, overhead, 0});
-  if (response.job > 0) {
-    const Duration earlier = response.job * (unit.volume - unit.period);
-    terms.push_back(Term{Term::Kind::Earlier, self, unit.dag, earlier, response.job});
-  }
-  for (const Blocker &blocker : view.blockers) {
-    terms.push_back(
-        Term{Term::Kind::Blocking, TaskId(blocker.task), task_set.tasks[blocker.task].dag, blocker.amount, 1});
-  }
-  for (const std::uint32_t u : more_urgent) {
-    const Unit &other = task_set.units[u];
-    const std::int64_t jobs = jobs_in({other.volume, other.period, other.jitter}, response.window, deferred);
-    const TaskId task = other.tasks.size() == 1 ? TaskId(other.tasks.front()) : TaskId();
-    terms.push_back(Term{Term::Kind::Interference, task, other.dag, jobs * other.volume, jobs});
-  }
-  if (unit.jitter > 0) terms.push_back(Term{Term::Kind::Jitter, self, unit.dag, unit.jitter, 0});
-  return terms;
-}
-
-// Any sink of the unit can end it; the shortest last stretch is the worst.
-Duration last_region_of(const TaskSet &task_set, const Unit &unit) {
-  Duration shortest = kUnbounded;
-  for (const std::uint32_t t : unit.tasks) {
-    if (task_set.tasks[t].successors.empty()) shortest = std::min(shortest, task_set.tasks[t].last_region);
-  }
-  return shortest;
 }
 
 }  // namespace
@@ -260,6 +204,10 @@ View Views::of(std::uint32_t unit) {
   return view;
 }
 
+FixedPoint no_fixed_point(int steps) {
+  return FixedPoint{std::nullopt, steps_ran_out(steps) ? kGaveUp : kExceedsLimit};
+}
+
 std::int64_t jobs_in(const Interferer &task, Duration window, bool deferred) {
   const Duration until = add(window, task.jitter);
   return deferred ? until / task.period + 1 : ceil_div(until, task.period);
@@ -272,7 +220,7 @@ FixedPoint preemptive_response(const Own &own, std::span<const Interferer> more_
   for (std::int64_t q = 0;; ++q) {
     const Int128 start = Int128{own.blocking} + (Int128{q} + 1) * own.wcet;
     w = std::max(w, saturate(start));
-    if (!fixed_point<false>(start, more_urgent, stop_of(own, q), w, steps)) return none(steps);
+    if (!fixed_point<false>(start, more_urgent, stop_of(own, q), w, steps)) return no_fixed_point(steps);
     const auto response = static_cast<Duration>(Int128{own.jitter} + w - Int128{q} * own.period);
     const auto from_ready = static_cast<Duration>(w - std::max(Int128{0}, Int128{q} * own.period - own.jitter));
     const Duration longest = std::max(worst.from_ready, from_ready);
@@ -283,54 +231,10 @@ FixedPoint preemptive_response(const Own &own, std::span<const Interferer> more_
   }
 }
 
-FixedPoint deferred_response(const Own &own, std::span<const Interferer> more_urgent) {
-  int steps = 0;
-  Response worst;
-  Duration w = 0;
-  // The busy period ends when all work that arrived before is done; jobs of this task arrive until then.
-  Duration length = 0;
-  for (std::int64_t q = 0;; ++q) {
-    const Int128 start = Int128{own.blocking} + (Int128{q} + 1) * own.wcet - own.last_region;
-    w = std::max(w, saturate(start));
-    if (!fixed_point<true>(start, more_urgent, stop_of(own, q) - own.last_region, w, steps)) return none(steps);
-    const auto response = static_cast<Duration>(Int128{own.jitter} + w - Int128{q} * own.period + own.last_region);
-    const auto from_ready =
-        static_cast<Duration>(Int128{w} + own.last_region - std::max(Int128{0}, Int128{q} * own.period - own.jitter));
-    const Duration longest = std::max(worst.from_ready, from_ready);
-    if (response > worst.response) worst = Response{response, w, q, 0};
-    worst.from_ready = longest;
-    // Tests whether the busy period with q + 1 own jobs ends before the next one arrives.
-    const Int128 all = Int128{own.blocking} + (Int128{q} + 1) * own.wcet;
-    const Duration next_arrival = saturate((Int128{q} + 1) * own.period - own.jitter);
-    length = std::max({length, saturate(all), w});
-    if (fixed_point<false>(all, more_urgent, next_arrival, length, steps)) return FixedPoint{worst, {}};
-    if (steps > kMaxSteps) return none(steps);
-  }
-}
-
-Bound bound_units(const TaskSet &task_set, bool deferred) {
-  std::vector<ResponseBound> responses(task_set.units.size());
-  Views views(task_set);
-  std::size_t done = 0;
-  for (const std::uint32_t u : views.order()) {
-    Effort::reached(done++, task_set.units.size());
-    const Unit &unit = task_set.units[u];
-    const View view = views.of(u);
-    const Own own{unit.volume, unit.period,   unit.jitter,
-                  unit.limit,  view.blocking, deferred ? last_region_of(task_set, unit) : 0};
-    const FixedPoint result =
-        deferred ? deferred_response(own, view.more_urgent) : preemptive_response(own, view.more_urgent);
-    if (!result.found) {
-      responses[u].absent = result.absent;
-      continue;
-    }
-    responses[u].response = result.found->response;
-    responses[u].from_ready = result.found->from_ready;
-    if (Effort::itemises(u)) {
-      responses[u].terms = terms_of(task_set, unit, view, views.more_urgent(u), *result.found, deferred);
-    }
-  }
-  return from_units(task_set, std::move(responses));
+bool settle(bool deferred, Int128 start, std::span<const Interferer> more_urgent, Duration stop, Duration &window,
+            int &steps) {
+  return deferred ? fixed_point<true>(start, more_urgent, stop, window, steps)
+                  : fixed_point<false>(start, more_urgent, stop, window, steps);
 }
 
 }  // namespace redag::analysis::one_worker

@@ -91,7 +91,6 @@ struct Own {
   Duration jitter = 0;
   Duration limit = 0;  // a response above it counts as none
   Duration blocking = 0;
-  Duration last_region = 0;  // its last part, which is not preempted; 0: preempted at any time
 };
 
 struct Response {
@@ -103,7 +102,7 @@ struct Response {
 
 /// Reasons for which a fixed point has no result.
 inline constexpr std::string_view kExceedsLimit =
-    "its response time can reach the next release, which would skip a job";
+    "its bound exceeds the time after which the next release would skip a job";
 inline constexpr std::string_view kGaveUp = "gave up: the busy period is too long";
 
 struct FixedPoint {
@@ -115,14 +114,15 @@ struct FixedPoint {
 /// period, at the first response above the limit, or after a fixed number of steps.
 [[nodiscard]] FixedPoint preemptive_response(const Own &own, std::span<const Interferer> more_urgent);
 
-/// R = max_q J + w(q) - q T + F with w(q) = B + (q + 1) C - F + sum (floor((w(q) + J_j) / T_j) + 1) C_j, over all jobs
-/// of the busy period. The length of that period is another fixed point. Requires F > 0.
-[[nodiscard]] FixedPoint deferred_response(const Own &own, std::span<const Interferer> more_urgent);
+/// settle() finds the least w >= `window` with w = start + sum of what the others do in w, and counts its steps. With
+/// `deferred` releases at the end of w count as well. Returns false if w exceeds `stop`, or if the steps run out.
+[[nodiscard]] bool settle(bool deferred, Int128 start, std::span<const Interferer> more_urgent, Duration stop,
+                          Duration &window, int &steps);
+
+/// no_fixed_point() says why settle() found none.
+[[nodiscard]] FixedPoint no_fixed_point(int steps);
 
 /// The number of jobs of `task` in the window of a response: with ceil(), or floor() + 1 before a last region.
 [[nodiscard]] std::int64_t jobs_in(const Interferer &task, Duration window, bool deferred);
-
-/// Turns the fixed point of every unit into response bounds with their terms.
-[[nodiscard]] Bound bound_units(const TaskSet &task_set, bool deferred);
 
 }  // namespace redag::analysis::one_worker

@@ -5,6 +5,7 @@
 
 #include "redag_analysis/core/rate_edges.hpp"
 #include "redag_analysis/one_worker/one_worker.hpp"
+#include "redag_analysis/one_worker/task_bounds.hpp"
 
 namespace redag::analysis {
 namespace {
@@ -24,22 +25,22 @@ std::optional<std::string> why_not(const TaskSet &task_set, sched::Preemption mo
 
 Outcome independent_full(const TaskSet &task_set) {
   if (auto reason = why_not(task_set, sched::Preemption::Full, false)) return NotApplicable{*reason};
-  return one_worker::bound_units(task_set, false);
+  return one_worker::bound_tasks(task_set, false);
 }
 
 Outcome independent_none(const TaskSet &task_set) {
   if (auto reason = why_not(task_set, sched::Preemption::None, false)) return NotApplicable{*reason};
-  return one_worker::bound_units(task_set, true);
+  return one_worker::bound_tasks(task_set, true);
 }
 
 Outcome independent_cooperative(const TaskSet &task_set) {
   if (auto reason = why_not(task_set, sched::Preemption::Cooperative, false)) return NotApplicable{*reason};
-  return one_worker::bound_units(task_set, true);
+  return one_worker::bound_tasks(task_set, true);
 }
 
 Outcome dags_full(const TaskSet &task_set) {
   if (auto reason = why_not(task_set, sched::Preemption::Full, true)) return NotApplicable{*reason};
-  return one_worker::bound_units(task_set, false);
+  return one_worker::bound_tasks(task_set, false);
 }
 
 Outcome dags_deferred(const TaskSet &task_set) {
@@ -47,7 +48,7 @@ Outcome dags_deferred(const TaskSet &task_set) {
       task_set.mode == sched::Preemption::Full ? sched::Preemption::None : task_set.mode;  // both None and Cooperative
                                                                                            // are accepted
   if (auto reason = why_not(task_set, mode, true)) return NotApplicable{*reason};
-  return one_worker::bound_units(task_set, true);
+  return one_worker::bound_tasks(task_set, true);
 }
 
 }  // namespace

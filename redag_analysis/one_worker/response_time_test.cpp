@@ -25,7 +25,7 @@ BoundCaseLimits everything(sched::Preemption preemption) {
   return limits;
 }
 
-const testing::BoundPropertyOptions kFew{.workloads = 250};
+const testing::BoundPropertyOptions kFew{.workloads = 250, .from_source = true};
 
 TEST(BoundProperty, RtaPreemptiveClassic) { expect_bound_holds(rta_preemptive(), cases({}), kFew); }
 

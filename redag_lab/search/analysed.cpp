@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "redag/base/nearest.hpp"
+#include "redag/sched/policy.hpp"
 #include "redag_analysis/many_workers/global.hpp"
 
 namespace redag::lab {
@@ -198,10 +199,38 @@ std::optional<Row> weakest_row(const Analysed &analysed) {
   return weakest;
 }
 
+namespace {
+
+// True if the task follows the other in its DAG, directly or not.
+bool is_after(const analysis::TaskSet &task_set, std::uint32_t task, std::uint32_t other) {
+  std::vector<std::uint32_t> after = task_set.tasks[other].successors;
+  for (std::size_t i = 0; i < after.size(); ++i) {
+    if (after[i] == task) return true;
+    for (const std::uint32_t next : task_set.tasks[after[i]].successors) {
+      if (std::find(after.begin(), after.end(), next) == after.end()) after.push_back(next);
+    }
+  }
+  return false;
+}
+
+// True if nothing of the task can run before the row's task ends, except as blocking, which is among the terms.
+bool is_below(const analysis::TaskSet &task_set, std::uint32_t task, const Row &row) {
+  if (task_set.mode != sched::Preemption::Full || !is_static(task_set.policy)) return false;
+  const DagId dag = row.task.valid() ? task_set.tasks[row.task.value].dag : row.dag;
+  std::uint32_t last = 0;
+  for (const analysis::CompiledTask &own : task_set.tasks) {
+    if (own.dag == dag) last = std::max(last, own.tier);
+  }
+  return task_set.tasks[task].tier > last;
+}
+
+}  // namespace
+
 std::vector<TaskId> suspects_of(const Analysed &analysed, const Row &row) {
   const analysis::TaskSet &task_set = analysed.task_set;
   std::vector<TaskId> suspects;
   const auto add = [&](std::uint32_t t) {
+    if (row.task.valid() && is_after(task_set, t, row.task.value)) return;
     if (std::find(suspects.begin(), suspects.end(), TaskId(t)) == suspects.end()) suspects.emplace_back(t);
   };
   std::vector<analysis::Term> terms;
@@ -220,7 +249,9 @@ std::vector<TaskId> suspects_of(const Analysed &analysed, const Row &row) {
     return static_cast<double>(task.wcet - task.waits) / static_cast<double>(task.period);
   };
   std::stable_sort(others.begin(), others.end(), [&](auto a, auto b) { return load(a) > load(b); });
-  for (const std::uint32_t t : others) add(t);
+  for (const std::uint32_t t : others) {
+    if (!is_below(task_set, t, row)) add(t);
+  }
   return suspects;
 }
 

@@ -87,7 +87,8 @@ struct Row {
 [[nodiscard]] std::optional<Row> weakest_row(const Analysed &analysed);
 
 /// Returns all tasks in the order in which a change of them is likely to help the row: those of its bound's largest
-/// terms, those of its DAG, and the others by utilization.
+/// terms, those of its DAG, and the others by utilization. Tasks that cannot delay the row are left out: those after
+/// it, and less urgent ones that block it with nothing.
 [[nodiscard]] std::vector<TaskId> suspects_of(const Analysed &analysed, const Row &row);
 
 }  // namespace redag::lab

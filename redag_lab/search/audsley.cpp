@@ -49,8 +49,11 @@ std::optional<Duration> one_worker_response(const analysis::TaskSet &task_set, s
     const analysis::Outcome outcome = method.apply(task_set);
     const analysis::Bound *bound = std::get_if<analysis::Bound>(&outcome);
     if (bound == nullptr) continue;
-    const std::optional<Duration> &found = bound->tasks[task_set.units[unit].tasks.front()].response;
-    if (found && (!best || *found < *best)) best = found;
+    Duration found = 0;
+    for (const std::uint32_t t : task_set.units[unit].tasks) {
+      found = std::max(found, bound->tasks[t].response.value_or(kNever));
+    }
+    if (found < best.value_or(kNever)) best = found;
   }
   return best;
 }

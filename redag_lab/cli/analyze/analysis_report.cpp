@@ -94,7 +94,7 @@ std::string remark(const lab::Analysed &analysed, const MethodReport &report) {
 
 std::string method_table(const lab::Analysed &analysed, const StreamTraits &terminal) {
   if (analysed.task_set.is_beyond_all()) {
-    return fmt::format("no method applies: {}\n", analysed.task_set.not_analysable);
+    return fmt::format("no method applies to all tasks: {}\n", analysed.task_set.not_analysable);
   }
   std::vector<const MethodReport *> order;  // trusted methods first
   for (const bool trusted : {true, false}) {
@@ -188,7 +188,8 @@ std::string verdict_in_words(const lab::Analysed &analysed) {
     return fmt::format("not schedulable: the utilization, {:.3f}, exceeds the capacity of {}", needed,
                        plural(workers, "worker"));
   }
-  if (analysed.task_set.is_beyond_all()) {
+  const auto has_bound = [](const analysis::Tightest &task) { return task.response.has_value(); };
+  if (analysed.task_set.is_beyond_all() && std::none_of(report.tasks.begin(), report.tasks.end(), has_bound)) {
     return "not shown schedulable: no method applies to this workload: " + analysed.task_set.not_analysable;
   }
   std::size_t late = 0;
@@ -225,7 +226,7 @@ std::string describe(const lab::Analysed &analysed, const StreamTraits &terminal
   text += "\n" + table_of("DAG", lab::dag_rows(analysed), terminal) + "\n";
   text +=
       "bound: response time from the nominal release that no job exceeds; for a DAG, and for its tasks where edges "
-      "join them, from the source's release to the finish of the last task; verdicts hold for every execution\n";
+      "join them, from the source's release; verdicts hold for every execution\n";
   for (const lab::Row &row : tasks) {
     if (*row.due == row.deadline) continue;
     text +=

@@ -117,7 +117,7 @@ TEST(AnalysisReport, WhatNoMethodTakesIsSaidOnce) {
   workload.dags[0].tasks[0].budget = kMillisecond;
   const lab::Analysed analysed = look_at(workload);
   const std::string text = describe(analysed, StreamTraits{}, false);
-  EXPECT_NE(text.find("no method applies: "), std::string::npos) << text;
+  EXPECT_NE(text.find("no method applies to all tasks: "), std::string::npos) << text;
   EXPECT_EQ(row_of(analysed, "fast").standing, lab::Standing::NoBound);
   EXPECT_NE(row_of(analysed, "fast").reason.find("budget"), std::string::npos);
 }

@@ -1,0 +1,123 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// The bounds of analyze() where features are mixed: each holds, and a feature of one task takes no bound from tasks
+// that it cannot delay.
+#include <gtest/gtest.h>
+
+#include <map>
+#include <string>
+
+#include "redag/model/workload_yaml.hpp"
+#include "redag_analysis/analyze/analyze.hpp"
+#include "redag_testing/bound_property.hpp"
+#include "redag_testing/random_workloads.hpp"
+#include "redag_testing/repository.hpp"
+
+namespace redag::analysis {
+namespace {
+
+using testing::BoundCase;
+
+Report analysed(const TaskSet &task_set) { return analyze(task_set); }
+
+Method whole_analysis() {
+  return Method{.name = "analyze",
+                .cite = "",
+                .assumptions = "",
+                .complexity = "",
+                .knows_waits = true,
+                .apply = [](const TaskSet &task_set) -> Outcome { return tightest_of(analysed(task_set)); }};
+}
+
+// Draws workloads with every feature that a bound covers, and some that none does.
+testing::BoundGenerator mixed(std::uint32_t workers, sched::Preemption preemption) {
+  testing::BoundCaseLimits limits;
+  limits.max_workers = workers;
+  limits.preemption = preemption;
+  limits.edges = true;
+  limits.max_dags = 4;
+  limits.max_tasks = 4;
+  limits.jitter = true;
+  limits.min_utilization = 0.1;
+  limits.max_utilization = 0.8;
+  limits.max_deadline = 1.5;
+  return [limits](Rng &rng) {
+    testing::BoundCaseLimits drawn = limits;
+    drawn.rates = testing::chance(rng, 0.5);
+    drawn.groups = testing::chance(rng, 0.3);
+    drawn.caps = testing::chance(rng, 0.3);
+    drawn.levels = testing::chance(rng, 0.2);
+    drawn.queues = testing::chance(rng, 0.3);
+    BoundCase bound_case = testing::random_bound_case(rng, drawn);
+    if (testing::chance(rng, 0.4)) testing::add_waits(rng, bound_case.workload);
+    for (Dag &dag : bound_case.workload.dags) {
+      for (Task &task : dag.tasks) {
+        if (task.group.empty() && testing::chance(rng, 0.05)) task.concurrency = 2;
+      }
+    }
+    return bound_case;
+  };
+}
+
+TEST(BoundProperty, OfMixedFeatures) {
+  using sched::Preemption;
+  for (const std::uint32_t workers : {1U, 3U}) {
+    for (const Preemption preemption : {Preemption::Full, Preemption::None, Preemption::Cooperative}) {
+      const std::uint32_t count = preemption == Preemption::Full ? 600 : 150;
+      testing::expect_bound_holds(whole_analysis(), mixed(workers, preemption),
+                                  {.workloads = count, .include_refused = true});
+    }
+  }
+}
+
+// The share of tasks with a bound is known, so that no change takes some away unnoticed.
+TEST(Composition, MostTasksOfMixedFeaturesHaveABound) {
+  std::uint64_t tasks = 0;
+  std::uint64_t bounded = 0;
+  for (std::uint64_t seed = 0; seed < 300; ++seed) {
+    Rng rng(mix(seed));
+    const BoundCase bound_case = mixed(3, sched::Preemption::Full)(rng);
+    for (const Tightest &task : analysed(testing::compiled(bound_case)).tasks) {
+      ++tasks;
+      bounded += task.response ? 1U : 0U;
+    }
+  }
+  EXPECT_GT(bounded * 100, tasks * 35) << bounded << " of " << tasks;
+}
+
+struct Case {
+  std::string file;
+  std::map<std::string, Duration> most;  // in microseconds
+};
+
+Workload read(const std::string &file) {
+  const auto loaded = load_workload(testing::repository() / "tests/cases" / (file + ".yaml"), {.waits = true});
+  EXPECT_TRUE(loaded) << file;
+  return loaded ? loaded->workload : Workload{};
+}
+
+TEST(Composition, PublishedAndReportedCases) {
+  const Case cases[] = {
+      {"chain_head", {{"head.read", 1000}, {"head.work", 16'000}, {"head", 16'000}}},
+      {"handlers", {{"a", 4000}, {"a.isr", 2000}, {"b.isr", 2000}, {"b", 19'000}}},
+      // M. Harbour, M. Klein, J. Lehoczky, Fixed priority scheduling of periodic tasks with varying execution priority,
+      // RTSS 1991.
+      {"varying_priorities", {{"t1", 28'000}, {"t2", 98'000}, {"t3", 47'000}, {"t4", 195'000}, {"t5", 223'000}}},
+      {"robot", {{"joints.controller", 400}, {"state.ekf", 801}, {"vision.camera", 2700}, {"vision", 32'204}}},
+  };
+  for (const Case &one : cases) {
+    const TaskSet task_set = testing::compiled(read(one.file));
+    const Report report = analysed(task_set);
+    std::map<std::string, std::optional<Duration>> found;
+    for (std::size_t t = 0; t < task_set.tasks.size(); ++t) found[task_set.tasks[t].name] = report.tasks[t].response;
+    for (std::size_t d = 0; d < task_set.dags.size(); ++d) found[task_set.dags[d].name] = report.dags[d].response;
+    for (const auto &[name, most] : one.most) {
+      ASSERT_TRUE(found.at(name)) << one.file << ": " << name;
+      EXPECT_EQ((*found.at(name) + 999) / 1000, most) << one.file << ": " << name;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace redag::analysis
