@@ -44,9 +44,10 @@ if(NOT CMAKE_BUILD_TYPE STREQUAL "Debug")
     redag/runtime/job_placement.cpp redag/runtime/release_*.cpp redag/runtime/waiting_jobs.cpp redag_analysis/sim/*.cpp)
   list(FILTER hot EXCLUDE REGEX "_test\\.cpp$")
   list(APPEND alone ${hot})
-  # The rest gains nothing from -O3, and compiles in less time without: small code where no job passes.
-  target_compile_options(redag PRIVATE $<$<CONFIG:Release>:-Os>)
-  target_compile_options(redag_analysis PRIVATE $<$<CONFIG:Release>:-O2>)
+  # The rest gains nothing from -O3, and compiles in less time without it.
+  foreach(target IN ITEMS redag redag_analysis)
+    target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O2>)
+  endforeach()
   list(TRANSFORM hot PREPEND ${PROJECT_SOURCE_DIR}/)
   set_source_files_properties(${hot} DIRECTORY ${PROJECT_SOURCE_DIR}/redag ${PROJECT_SOURCE_DIR}/redag_analysis
     PROPERTIES COMPILE_OPTIONS $<$<CONFIG:Release>:-O3>)
