@@ -318,12 +318,12 @@ TEST(Executor, CanBeDestroyedAfterItCouldNotStart) {
   EXPECT_THROW(executor.run(), std::runtime_error);
 }
 
-Executor *interrupted = nullptr;
+Executor *interrupted_executor = nullptr;
 
 TEST(Executor, RequestStopWorksFromASignalHandler) {
   Executor executor(one_worker());
-  interrupted = &executor;
-  auto *const old = std::signal(SIGUSR1, [](int) { interrupted->request_stop(); });
+  interrupted_executor = &executor;
+  auto *const old = std::signal(SIGUSR1, [](int) { interrupted_executor->request_stop(); });
   DagBuilder dag("dag");
   dag.timer("raise", 1ms, [] { kill(getpid(), SIGUSR1); });  // to the process: runtime threads block it
   executor.add(std::move(dag));

@@ -21,7 +21,6 @@ namespace {
 using analysis::Method;
 using analysis::MethodReport;
 using analysis::NotApplicable;
-using analysis::Verdict;
 
 constexpr std::size_t kMostTasks = 50;  // with more tasks, the table shows only this many, the tightest
 
@@ -75,7 +74,7 @@ std::string format_share(Duration part, Duration whole) {
 // Summarises a method's answer in a few words.
 Cell answer(const MethodReport &report) {
   if (!report.trusted) return {"not sound here", Tint::Caution};
-  if (report.verdict == Verdict::Schedulable) return {"schedulable", Tint::Good};
+  if (report.verdict == analysis::Verdict::Schedulable) return {"schedulable", Tint::Good};
   return {"not shown", Tint::Caution};
 }
 
@@ -179,7 +178,7 @@ std::string mode_reason(const lab::Analysed &analysed) {
 
 std::string verdict_in_words(const lab::Analysed &analysed) {
   const analysis::Report &report = analysed.report;
-  if (report.verdict == Verdict::Schedulable) {
+  if (report.verdict == analysis::Verdict::Schedulable) {
     return fmt::format("schedulable: every deadline is met, by {}", listed(report.by));
   }
   const double needed = analysed.workload.utilization();
@@ -234,7 +233,7 @@ std::string describe(const lab::Analysed &analysed, const StreamTraits &terminal
         "started, whichever is sooner\n";
     break;
   }
-  const bool yes = analysed.report.verdict == Verdict::Schedulable;
+  const bool yes = analysed.report.verdict == analysis::Verdict::Schedulable;
   const std::string words = verdict_in_words(analysed);
   const std::size_t colon = words.find(':');
   text += "\n" + tinted(words.substr(0, colon), yes ? Tint::Good : Tint::Bad, terminal.colour) + words.substr(colon);
@@ -251,7 +250,7 @@ std::optional<std::string> suggested_change(const lab::Analysed &analysed, const
 }
 
 std::string summarise(const lab::Analysed &analysed, const StreamTraits &terminal) {
-  const bool yes = analysed.report.verdict == Verdict::Schedulable;
+  const bool yes = analysed.report.verdict == analysis::Verdict::Schedulable;
   const std::string words = verdict_in_words(analysed);
   const std::size_t colon = words.find(':');
   const std::string reason = mode_reason(analysed);

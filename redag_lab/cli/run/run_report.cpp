@@ -20,7 +20,7 @@
 namespace redag::cli {
 namespace {
 
-constexpr std::size_t kMostTasks = 50;  // with more tasks, the table shows only this many, the worst
+constexpr std::size_t kMostTaskRows = 50;  // with more tasks, the table shows only this many, the worst
 
 // Formats a duration, or "-" if there is none.
 Cell spread_cell(const metrics::Distribution &distribution, Duration metrics::Distribution::*value) {
@@ -39,7 +39,7 @@ Cell missed_jobs_cell(const metrics::JobCounts &jobs) {
 std::vector<std::size_t> shown_tasks(const metrics::Summary &summary, bool all) {
   std::vector<std::size_t> order(summary.tasks.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  if (all || order.size() <= kMostTasks) return order;
+  if (all || order.size() <= kMostTaskRows) return order;
   const auto worse = [&](std::size_t a, std::size_t b) {
     const metrics::JobStats &x = summary.tasks[a].jobs;
     const metrics::JobStats &y = summary.tasks[b].jobs;
@@ -47,8 +47,8 @@ std::vector<std::size_t> shown_tasks(const metrics::Summary &summary, bool all) 
       return x.miss_ratio_with_lost() > y.miss_ratio_with_lost();
     return x.max_lateness.value_or(-kMaxDuration) > y.max_lateness.value_or(-kMaxDuration);
   };
-  std::partial_sort(order.begin(), order.begin() + kMostTasks, order.end(), worse);
-  order.resize(kMostTasks);
+  std::partial_sort(order.begin(), order.begin() + kMostTaskRows, order.end(), worse);
+  order.resize(kMostTaskRows);
   return order;
 }
 
@@ -82,8 +82,8 @@ std::string task_table(const lab::Session &session, const StreamTraits &terminal
                {humanize_duration(refs[i].task->deadline)}});
   }
   std::string text = table.render(terminal.width, terminal.colour);
-  if (!all && session.summary.tasks.size() > kMostTasks) {
-    text += fmt::format("(the worst {} of {} tasks; --all-tasks shows all)\n", kMostTasks,
+  if (!all && session.summary.tasks.size() > kMostTaskRows) {
+    text += fmt::format("(the worst {} of {} tasks; --all-tasks shows all)\n", kMostTaskRows,
                         format_count(session.summary.tasks.size()));
   }
   return text;

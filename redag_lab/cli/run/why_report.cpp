@@ -95,7 +95,7 @@ std::string headline_of(const WhyOverview &overview) {
   return text;
 }
 
-Json to_json(const Culprit &cause, const trace::RunInfo &run) {
+Json json_of(const Culprit &cause, const trace::RunInfo &run) {
   const Workload &workload = run.workload;
   Json row{{"cause", to_string(cause.cause)},
            {"task", cause.task.valid() ? Json(trace::task_name(workload, cause.task)) : Json()},
@@ -108,7 +108,7 @@ Json to_json(const Culprit &cause, const trace::RunInfo &run) {
   return row;
 }
 
-Json to_json(const std::optional<metrics::MainCause> &main, const trace::RunInfo &run) {
+Json json_of(const std::optional<metrics::MainCause> &main, const trace::RunInfo &run) {
   if (!main) return {};
   return Json{{"cause", to_string(main->culprits.front().cause)},
               {"jobs", main->jobs},
@@ -116,7 +116,7 @@ Json to_json(const std::optional<metrics::MainCause> &main, const trace::RunInfo
               {"remedy", or_null(metrics::remedy(*main, run))}};
 }
 
-Json to_json(const Explanation &one, const trace::RunInfo &run) {
+Json json_of(const Explanation &one, const trace::RunInfo &run) {
   const auto name = [&](const JobId &job) { return job.valid() ? Json(metrics::job_name(run.workload, job)) : Json(); };
   Json parts = Json::array();
   for (const Part &part : one.parts) {
@@ -195,9 +195,9 @@ std::string describe(const WhyOverview &overview, const trace::RunInfo &run, con
 
 Json to_json(const WhyOverview &overview, const trace::RunInfo &run) {
   Json causes = Json::array();
-  for (const Culprit &cause : overview.causes) causes.push_back(to_json(cause, run));
+  for (const Culprit &cause : overview.causes) causes.push_back(json_of(cause, run));
   Json jobs = Json::array();
-  for (const Explanation &one : overview.explanations) jobs.push_back(to_json(one, run));
+  for (const Explanation &one : overview.explanations) jobs.push_back(json_of(one, run));
   return Json{{"format", "redag.why/1"},
               {"workload", run.workload.name},
               {"executor", run.executor},
@@ -205,7 +205,7 @@ Json to_json(const WhyOverview &overview, const trace::RunInfo &run) {
               {"misses", overview.misses()},
               {"missed", overview.missed},
               {"late_end_to_end", overview.late_end_to_end},
-              {"main_cause", overview.misses() == 0 ? Json() : to_json(metrics::main_cause_of(overview.causes), run)},
+              {"main_cause", overview.misses() == 0 ? Json() : json_of(metrics::main_cause_of(overview.causes), run)},
               {"causes", std::move(causes)},
               {"jobs", std::move(jobs)}};
 }
