@@ -22,11 +22,11 @@ namespace redag {
 namespace {
 
 constexpr std::array<const char *, kFieldCount> kFieldNames = {
-    "name",       "platform",    "workers",     "preemption", "policy",    "ties",      "dags",       "tasks",
-    "max_active", "max_pending", "criticality", "degrade",    "wcet",      "wcet_low",  "bcet",       "period",
-    "deadline",   "offset",      "jitter",      "region",     "budget",    "on_budget", "activation", "overrun",
-    "priority",   "concurrency", "group",       "after",      "execution", "callback",  "clusters",   "cluster",
-    "cpus",       "segments",    "devices",     "rate"};
+    "name",       "platform",    "workers",     "preemption", "policy", "ties",      "dags",      "tasks",
+    "max_active", "max_pending", "criticality", "degrade",    "edges",  "wcet",      "wcet_low",  "bcet",
+    "period",     "deadline",    "offset",      "jitter",     "region", "budget",    "on_budget", "activation",
+    "overrun",    "priority",    "concurrency", "group",      "after",  "execution", "callback",  "clusters",
+    "cluster",    "cpus",        "segments",    "devices",    "rate"};
 
 struct DurationRule {
   Field field;

@@ -44,6 +44,7 @@ enum class Field : std::uint8_t {
   MaxPending,
   Criticality,
   Degrade,
+  Edges,
   Wcet,
   WcetLow,
   Bcet,
@@ -70,7 +71,7 @@ enum class Field : std::uint8_t {
   Rate,  // in place of Period; find_mistakes() knows periods only
 };
 
-inline constexpr std::size_t kFieldCount = 36;
+inline constexpr std::size_t kFieldCount = 37;
 
 [[nodiscard]] const char *to_string(Field field);
 

@@ -89,6 +89,8 @@ void inherit_periods(Dag &dag) {
   }
 }
 
+const char *to_string(Edges value) { return value == Edges::Executed ? "executed" : "seen"; }
+
 const char *to_string(Criticality value) {
   switch (value) {
     case Criticality::Low: return "low";

@@ -127,6 +127,12 @@ struct Degrade {
   friend bool operator==(const Degrade &, const Degrade &) = default;
 };
 
+/// Under ROS 2, what the edges of a DAG do. Everywhere else they are executed.
+enum class Edges : std::uint8_t {
+  Executed,  // a callback waits for its message and for its predecessors
+  Seen,      // a callback waits for its message only: the edges were learned, and serve the analysis
+};
+
 /// G_k = (V_k, E_k) (eq. dag). Tasks are in no particular order; the edges are acyclic.
 struct Dag {
   std::string name;
@@ -135,7 +141,8 @@ struct Dag {
   std::uint32_t max_pending = 0;  // jobs released and not started at any time; 0: no bound
   Duration deadline = 0;          // end to end, from a source's release to a sink's finish; 0: none
   Criticality criticality = Criticality::Normal;
-  Degrade degrade;           // only used if the DAG is not of high criticality
+  Degrade degrade;  // only used if the DAG is not of high criticality
+  Edges edges = Edges::Executed;
   std::string cluster = {};  // name of the cluster that serves it; empty: the only one, or the whole platform
   bool is_foreign = false;   // stands for threads of other programs, which have no deadline to meet
   /// Which of several executors starts its jobs. Each has its own clock and its own HI mode.
@@ -233,6 +240,7 @@ void inherit_periods(Dag &dag);
 
 [[nodiscard]] const char *to_string(Criticality value);
 [[nodiscard]] const char *to_string(Activation value);
+[[nodiscard]] const char *to_string(Edges value);
 
 /// How a file states the phases of a task: `activation: event`, `offset: any`.
 inline constexpr const char *kEventActivation = "event";

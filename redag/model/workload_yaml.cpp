@@ -34,7 +34,7 @@ constexpr std::array kPlatformFields = {Field::Workers, Field::Cpus, Field::Pree
 constexpr std::array kClusterFields = {Field::Name, Field::Workers, Field::Cpus};
 constexpr std::array kDagFields = {Field::Name,     Field::Cluster,   Field::Period,     Field::Rate,
                                    Field::Deadline, Field::MaxActive, Field::MaxPending, Field::Criticality,
-                                   Field::Degrade,  Field::Tasks};
+                                   Field::Degrade,  Field::Edges,     Field::Tasks};
 constexpr std::array kTaskFields = {
     Field::Name,       Field::Wcet,    Field::Bcet,     Field::Period,      Field::Deadline,  Field::Offset,
     Field::Jitter,     Field::Region,  Field::Budget,   Field::Concurrency, Field::Group,     Field::Criticality,
@@ -42,6 +42,7 @@ constexpr std::array kTaskFields = {
     Field::OnBudget,   Field::WcetLow, Field::Segments, Field::Rate};
 
 constexpr std::array kCriticalities = {Criticality::Low, Criticality::Normal, Criticality::High};
+constexpr std::array kEdges = {Edges::Executed, Edges::Seen};
 constexpr std::array kOnBudgets = {OnBudget::Abort, OnBudget::Log, OnBudget::Demote, OnBudget::SkipNext};
 /// `activation` in a file says what releases a task, and of a timer task whether it is a timer at all.
 enum class Released : std::uint8_t { ByTimer, ByData, ByEvent };
@@ -246,6 +247,7 @@ class Reader : private yaml::ValueReader {
     take_count(part, Field::MaxPending, dag.max_pending, kMaxBound);
     take_enum(part, Field::Criticality, dag.criticality, kCriticalities);
     take_degrade(dag.degrade, part);
+    take_enum(part, Field::Edges, dag.edges, kEdges);
     const std::vector<Node> *tasks = take_list(part, Field::Tasks);
     if (tasks == nullptr) return;
     dag.tasks.resize(tasks->size());

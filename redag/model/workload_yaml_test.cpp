@@ -92,6 +92,7 @@ dags:
     deadline: 30ms
     max_active: 2
     max_pending: 5
+    edges: seen
     criticality: high
     tasks:
       - name: late
@@ -113,6 +114,7 @@ dags:
   EXPECT_EQ(dag.deadline, 30 * kMillisecond);
   EXPECT_EQ(dag.max_active, 2U);
   EXPECT_EQ(dag.max_pending, 5U);
+  EXPECT_EQ(dag.edges, Edges::Seen);
 
   const Task &late = dag.tasks.at(0);
   EXPECT_EQ(late.predecessors, (std::vector<std::uint32_t>{1, 2}));

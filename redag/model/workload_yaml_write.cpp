@@ -243,6 +243,7 @@ void write_dag(Writer &out, const Platform &platform, const Dag &dag) {
   if (dag.max_pending != 0) write(out, Field::MaxPending, dag.max_pending);
   if (dag.criticality != Criticality::Normal) write(out, Field::Criticality, to_string(dag.criticality));
   write_degrade(out, dag.degrade);
+  if (dag.edges != Edges::Executed) write(out, Field::Edges, to_string(dag.edges));
   out.text(to_string(Field::Tasks));
   out.begin_list();
   for (const Task &task : dag.tasks) write_task(out, platform, dag, task, period);

@@ -72,6 +72,7 @@ Workload arbitrary_workload() {
                                                  "{", "*a", "5ms", "caf\xC3\xA9", "a,b]", "\xF0\x9F\xA4\x96", "!t");
   for (Dag &dag : workload.dags) {
     dag.max_pending = *rc::gen::inRange(0U, 3U);
+    dag.edges = *rc::gen::element(Edges::Executed, Edges::Seen);
     dag.deadline = *rc::gen::element<Duration>(0, 7 * kMillisecond);
     dag.criticality = *rc::gen::element(Criticality::Low, Criticality::Normal, Criticality::High);
     if (dag.criticality != Criticality::High) {

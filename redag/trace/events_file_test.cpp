@@ -185,11 +185,14 @@ TEST_F(EventsFile, RemarksAreKept) {
 TEST_F(EventsFile, WhatChangedInTheRunIsKept) {
   Trace trace = example();
   trace.info.removals = {{TaskId(0), 70}};
+  trace.info.edges = {{.from = TaskId(0), .to = TaskId(1), .since = 5, .until = 70},
+                      {.from = TaskId(1), .to = TaskId(0), .since = 80}};
   trace.info.settled = 80;
   trace.info.origin = 1234;
   written(trace);
   const RunInfo read = read_trace(path_).value().info;
   EXPECT_EQ(read.removals, trace.info.removals);
+  EXPECT_EQ(read.edges, trace.info.edges);
   EXPECT_EQ(read.settled, trace.info.settled);
   EXPECT_EQ(read.origin, trace.info.origin);
   std::string bad = run_info_to_json(trace.info);

@@ -184,6 +184,34 @@ TEST(RulesFor, DependOnWhoSawTheRun) {
   EXPECT_TRUE(broken(grid, Rule::Grid, trace::Driver::RosNodes, "ste"));
 }
 
+// hi, then lo, twice each. The second job of lo becomes ready before the second one of hi ends.
+trace::Trace run_of_callbacks() {
+  TraceBuilder t(two_tasks(PreemptionMode::None, 2));
+  t.at(0).arrives("hi", 0).dispatched("hi", 0, 0, 10).at(1).finished("hi", 0, 0);
+  t.at(1).arrives("lo", 0).dispatched("lo", 0, 0, 21).at(5).finished("lo", 0, 0);
+  t.at(10).arrives("hi", 1).dispatched("hi", 1, 0, 20);
+  t.at(11).arrives("lo", 1).dispatched("lo", 1, 1, 31).at(12).finished("hi", 1, 0).at(15).finished("lo", 1, 1);
+  trace::Trace trace = t.until(20);
+  trace.info.driver = trace::Driver::Ros;
+  return trace;
+}
+
+TEST(CheckTrace, EdgesOfCallbacksHoldForTheirTime) {
+  const auto broken = [](trace::Trace trace, const trace::Edge &edge) {
+    trace.info.edges = {edge};
+    const CheckReport report = check_trace(trace, rules_for(trace.info));
+    EXPECT_EQ(report.violation_count, report.violated(Rule::Precedence)) << report.to_string();
+    return report.violation_count;
+  };
+  const trace::Trace trace = run_of_callbacks();
+  const TaskId hi(0);
+  const TaskId lo(1);
+  EXPECT_EQ(broken(trace, {.from = hi, .to = lo}), 1U);
+  EXPECT_EQ(broken(trace, {.from = hi, .to = lo, .since = 12 * kMillisecond}), 0U) << "it came later";
+  EXPECT_EQ(broken(trace, {.from = hi, .to = lo, .until = 11 * kMillisecond}), 0U) << "it had gone";
+  EXPECT_EQ(broken(trace, {.from = lo, .to = hi}), 1U) << "the first job of hi";
+}
+
 // src (T 10, C 1) -> aligned (T 10, same grid), slower (T 20) and data.
 Workload diamond() {
   return make_workload(

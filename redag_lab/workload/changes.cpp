@@ -106,6 +106,7 @@ class Comparer {
     add(Kind::Demand, "deadline" + of, time_text(a.deadline), time_text(b.deadline));
     add(Kind::Setting, "criticality" + of, to_string(a.criticality), to_string(b.criticality));
     add(Kind::Setting, "degrade" + of, degrade_text(a.degrade), degrade_text(b.degrade));
+    add(Kind::Setting, "edges" + of, to_string(a.edges), to_string(b.edges));
     match(a.tasks, b.tasks, "task " + a.name + ".", [&](const Task &x, const Task &y) {
       compare(x, predecessors_text(a, x), y, predecessors_text(b, y), a.name);
     });

@@ -30,7 +30,7 @@ void JoinBase::clear_on_ready_callback() {
   on_ready_ = nullptr;
 }
 
-void JoinBase::add_inputs(rcl_wait_set_t &set) const {
+void JoinBase::fill(rcl_wait_set_t &set) {
   for (const Input &input : inputs_) {
     check_rcl(rcl_wait_set_add_subscription(&set, input.subscription->get_subscription_handle().get(), nullptr),
               "cannot wait for a topic of a join");
@@ -69,7 +69,7 @@ void JoinBase::note_kept() {
   for (std::size_t i = 0; i < inputs_.size(); ++i) inputs_[i].kept = keeps_message_of(i);
 }
 
-void JoinBase::run() {
+void JoinBase::run(const std::shared_ptr<void> & /*data*/) {
   (void)take();
   for (;;) {
     std::function<void()> call;

@@ -320,7 +320,9 @@ void Registry::find_places(const std::vector<Entity> &found) {
 }
 
 const std::vector<std::uint32_t> &Registry::predecessors_of(Place place) const {
-  return options_.workload->dags[place.first].tasks[place.second].predecessors;
+  static const std::vector<std::uint32_t> none;
+  const redag::Dag &dag = options_.workload->dags[place.first];
+  return dag.edges == redag::Edges::Executed ? dag.tasks[place.second].predecessors : none;
 }
 
 bool Registry::has_predecessor(Place place) const {

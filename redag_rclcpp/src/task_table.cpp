@@ -71,6 +71,7 @@ TaskTable::TaskTable(redag::Platform platform, redag::PolicyKind policy, redag::
   // equals. In HI mode they run after everything else, and not more often than their periods.
   dags_.emplace_back().name = "ros";
   dags_.back().degrade = redag::Degrade{.kind = redag::Degrade::Kind::Stretch, .skip = 1, .stretch = 1};
+  dags_.back().edges = redag::Edges::Seen;
 }
 
 void TaskTable::set(TaskId task, Entry entry) {

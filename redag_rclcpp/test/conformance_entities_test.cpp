@@ -17,12 +17,12 @@
 #include <utility>
 #include <vector>
 
-#include "any_waitable.hpp"
 #include "conformance.hpp"
 #include "rclcpp/detail/add_guard_condition_to_rcl_wait_set.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "rclcpp_action/rclcpp_action.hpp"
 #include "rclcpp_lifecycle/lifecycle_node.hpp"
+#include "redag_rclcpp/any_waitable.hpp"
 #include "spinning.hpp"
 #include "test_msgs/action/fibonacci.hpp"
 #include "test_msgs/msg/empty.hpp"

@@ -336,6 +336,18 @@ dags:
   EXPECT_THAT(stop(), IsEmpty());
 }
 
+TEST_P(PrecedenceTest, EdgesThatWereOnlySeenAreNotExecuted) {
+  const auto fusion = subscribe("camera", runs.body("fusion", [] {}));
+  const auto camera = subscribe("start", runs.body("camera", [] {}));
+  const auto outside = publisher("camera");
+  std::string seen = kChain;
+  seen.replace(seen.find("name: d"), 7, "name: d\n    edges: seen");
+  start(seen);
+  send(outside);
+  ASSERT_TRUE(eventually([&] { return runs.count("fusion") == 1; }));
+  EXPECT_THAT(stop(), IsEmpty());
+}
+
 // ---- random DAGs ----
 
 /// A random DAG whose first task is released from outside. Every other task follows one to three earlier ones, and gets

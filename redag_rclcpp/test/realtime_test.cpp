@@ -23,13 +23,13 @@
 #include <utility>
 #include <vector>
 
-#include "any_waitable.hpp"
 #include "log_capture.hpp"
 #include "mode_test.hpp"
 #include "process_tasks.hpp"
 #include "rclcpp/waitable.hpp"
 #include "redag/runtime/parker.hpp"
 #include "redag/runtime/threads.hpp"
+#include "redag_rclcpp/any_waitable.hpp"
 #include "spinning.hpp"
 
 namespace redag_rclcpp {

@@ -31,35 +31,23 @@
 #include <vector>
 
 #include "rclcpp/rclcpp.hpp"
-#include "rclcpp/version.h"
-#include "rclcpp/waitable.hpp"
 #include "redag/base/pi_mutex.hpp"
+#include "redag_rclcpp/any_waitable.hpp"
 
 namespace redag_rclcpp {
 
 /// The part of a join that does not depend on the types of its messages.
-class JoinBase : public rclcpp::Waitable {
+class JoinBase : public AnyWaitable {
  public:
   JoinBase(const JoinBase &) = delete;
   JoinBase &operator=(const JoinBase &) = delete;
 
   [[nodiscard]] std::size_t get_number_of_ready_subscriptions() override { return inputs_.size(); }
-  std::shared_ptr<void> take_data() override { return nullptr; }
-  std::shared_ptr<void> take_data_by_entity_id(std::size_t /*id*/) override { return nullptr; }
   void set_on_ready_callback(std::function<void(std::size_t, int)> callback) override;
   void clear_on_ready_callback() override;
-#if RCLCPP_VERSION_MAJOR >= 28
-  void add_to_wait_set(rcl_wait_set_t &set) override { add_inputs(set); }
-  bool is_ready(const rcl_wait_set_t & /*set*/) override { return take(); }
-  void execute(const std::shared_ptr<void> & /*data*/) override { run(); }
-#else
-  void add_to_wait_set(rcl_wait_set_t *set) override { add_inputs(*set); }
-  bool is_ready(rcl_wait_set_t * /*set*/) override { return take(); }
-  void execute(std::shared_ptr<void> & /*data*/) override { run(); }
-#endif
-#if RCLCPP_VERSION_GTE(29, 4, 0)
-  [[nodiscard]] std::vector<std::shared_ptr<rclcpp::TimerBase>> get_timers() const override { return {}; }
-#endif
+  void fill(rcl_wait_set_t &set) override;
+  bool is_ready_in(const rcl_wait_set_t & /*set*/) override { return take(); }
+  void run(const std::shared_ptr<void> & /*data*/) override;
 
  protected:
   JoinBase() = default;
@@ -82,9 +70,7 @@ class JoinBase : public rclcpp::Waitable {
   /// Removes a set, and returns the call of the user's function with it. Requires has_set().
   [[nodiscard]] virtual std::function<void()> use_set() = 0;
 
-  void add_inputs(rcl_wait_set_t &set) const;
   [[nodiscard]] bool take();
-  void run();
   void arrived(std::size_t input);
   void tell_if_complete() REDAG_REQUIRES(hook_lock_);
   void note_kept() REDAG_REQUIRES(hook_lock_);

@@ -1,8 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// AnyWaitable is a base for the waitables of tests. Its virtual functions have the same parameters on every
-// distribution.
+// AnyWaitable is a base for waitables. Its virtual functions have the same parameters on every distribution.
 #pragma once
 
 #include <cstddef>
