@@ -47,11 +47,31 @@ function(redag_add_shards group program)
   endforeach()
 endfunction()
 
+# All test programs share these headers. A test compiles in up to a quarter less time with them. `dev` has none: it finds
+# missing includes.
+function(redag_precompile program)
+  if(NOT CMAKE_UNITY_BUILD)
+    return()
+  endif()
+  # Without it, ccache refuses GCC's precompiled headers.
+  target_compile_options(${program} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-fpch-preprocess>)
+  get_property(first GLOBAL PROPERTY redag_precompiled)
+  if(first)
+    target_precompile_headers(${program} REUSE_FROM ${first})
+    return()
+  endif()
+  set_property(GLOBAL PROPERTY redag_precompiled ${program})
+  target_precompile_headers(${program} PRIVATE <algorithm> <chrono> <filesystem> <fstream> <functional> <map> <optional>
+    <random> <set> <sstream> <string> <thread> <variant> <vector> <fmt/format.h> <gmock/gmock.h> <gtest/gtest.h>
+    <nlohmann/json.hpp> <rapidcheck.h> <tl/expected.hpp>)
+endfunction()
+
 # redag_add_test_program(<group> <source>...)
 function(redag_add_test_program group)
   set(program redag_${group}_test)
   add_executable(${program} ${ARGN})
   target_link_libraries(${program} PRIVATE redag_testing GTest::gtest_main redag_warnings)
+  redag_precompile(${program})
   if(REDAG_SANITIZE)
     redag_add_shards(${group} ${program})
     return()

@@ -50,5 +50,6 @@ if(CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
     cmake_path(GET common PARENT_PATH common)
     cmake_path(IS_PREFIX common ${PROJECT_BINARY_DIR} NORMALIZE is_common)
   endwhile()
-  set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_BASEDIR=${common} ${CCACHE})
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_BASEDIR=${common}
+    CCACHE_SLOPPINESS=pch_defines,time_macros ${CCACHE})  # else ccache refuses sources with precompiled headers
 endif()
