@@ -17,7 +17,7 @@ enum class LockClass : std::uint8_t {
   Unbounded,   // its owner may compute, allocate or wait: no thread that must react takes it
 };
 
-#ifdef _GLIBCXX_ASSERTIONS
+#ifdef REDAG_CHECK_LOCK_CLASSES  // the same for the library and all that use it
 inline constexpr bool kChecksLockClasses = true;
 #else
 inline constexpr bool kChecksLockClasses = false;

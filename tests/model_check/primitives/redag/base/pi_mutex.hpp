@@ -4,6 +4,7 @@
 // Replaces redag/base/pi_mutex.hpp by a mutex of the explorer. It knows no priorities: every order is tried.
 #pragma once
 
+#include "redag/base/lock_class.hpp"
 #include "redag/base/thread_annotations.hpp"
 #include "redag_testing/explorer.hpp"
 
@@ -11,7 +12,8 @@ namespace redag {
 
 class REDAG_CAPABILITY("mutex") PiMutex {
  public:
-  explicit PiMutex(bool = true) {}
+  explicit PiMutex(bool = true, LockClass = LockClass::Undeclared) {}
+  explicit PiMutex(LockClass) {}
   PiMutex(const PiMutex &) = delete;
   PiMutex &operator=(const PiMutex &) = delete;
 
