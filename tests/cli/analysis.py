@@ -210,7 +210,7 @@ dags:
         self.assertIn("the largest contribution is 25ms of 33ms (75.8 %); nothing needs to change", text)
         text = self.expect(redag("analyze", self.cart, "--explain", "fast"), 0).stdout
         self.assertIn("fast: no bound", text)
-        self.assertIn("the next release, which would skip a job", text)
+        self.assertIn("the time after which the next release would skip a job", text)
 
     def test_chains(self):
         chain = ("--preemption", "os", "--chain", "fast.sense,fast.act,slow.plan", "--chain", "slow.plan")
