@@ -184,11 +184,15 @@ TEST(DagShapes, AreNeverAboveMelani) {
     const Outcome shapes = dag_shapes().apply(task_set);
     ASSERT_EQ(std::holds_alternative<Bound>(shapes), std::holds_alternative<Bound>(melanis) && task_set.has_edges());
     if (!std::holds_alternative<Bound>(shapes)) return;
+    const auto &dags = std::get<Bound>(melanis).dags;
+    const bool all_bounded = std::all_of(dags.begin(), dags.end(), [](const auto &dag) { return dag.response; });
     for (std::size_t d = 0; d < task_set.dags.size(); ++d) {
-      const auto worse = std::get<Bound>(melanis).dags[d].response;
+      const auto worse = dags[d].response;
       const auto better = std::get<Bound>(shapes).dags[d].response;
       if (!worse) continue;
-      ASSERT_TRUE(better);
+      // Below a DAG without a bound, only melani goes on.
+      ASSERT_TRUE(better || !all_bounded);
+      if (!better) continue;
       ASSERT_LE(*better, *worse);
       ++bounds;
       if (*better < *worse) ++smaller;
