@@ -53,7 +53,7 @@ void JoinBase::tell_if_complete() {
 
 // A wait set returns at once while a subscription has messages. Therefore they are taken even if there is no set.
 bool JoinBase::take() {
-  const std::lock_guard guard(lock_);
+  const redag::LockGuard guard(lock_);
   {
     const redag::LockGuard hook_guard(hook_lock_);
     told_ = false;
@@ -74,13 +74,13 @@ void JoinBase::run(const std::shared_ptr<void> & /*data*/) {
   for (;;) {
     std::function<void()> call;
     {
-      const std::lock_guard guard(lock_);
+      const redag::LockGuard guard(lock_);
       if (!has_set()) break;
       call = use_set();
     }
     call();
   }
-  const std::lock_guard guard(lock_);
+  const redag::LockGuard guard(lock_);
   const redag::LockGuard hook_guard(hook_lock_);
   note_kept();
   if (std::any_of(inputs_.begin(), inputs_.end(), [](const Input &input) { return input.arrived; })) tell_if_complete();

@@ -23,7 +23,6 @@
 #include <deque>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <tuple>
@@ -31,7 +30,9 @@
 #include <vector>
 
 #include "rclcpp/rclcpp.hpp"
+#include "redag/base/mutex.hpp"
 #include "redag/base/pi_mutex.hpp"
+#include "redag/base/thread_annotations.hpp"
 #include "redag_rclcpp/any_waitable.hpp"
 
 namespace redag_rclcpp {
@@ -75,7 +76,7 @@ class JoinBase : public AnyWaitable {
   void tell_if_complete() REDAG_REQUIRES(hook_lock_);
   void note_kept() REDAG_REQUIRES(hook_lock_);
 
-  std::mutex lock_;  // of the messages
+  redag::Mutex lock_;  // of the messages
   std::vector<Input> inputs_;
   redag::PiMutex
       hook_lock_;      // of `arrived`, `kept` and what follows; taken after lock_, and by the middleware's threads
