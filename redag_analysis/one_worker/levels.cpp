@@ -192,11 +192,12 @@ void Levels::find_longest() {
 // `all`, or of the longest stretches and all these tasks.
 std::vector<Once> Levels::all_follow_once(std::vector<Once> all, std::vector<Once> stretches, const Once &follow) {
   const auto sum = [](const std::vector<Once> &of) {
-    return std::accumulate(of.begin(), of.end(), Duration{0},
-                           [](Duration before, const Once &once) { return before + once.stretch + once.follows; });
+    return std::accumulate(of.begin(), of.end(), Duration{0}, [](Duration before, const Once &once) {
+      return add(add(before, once.stretch), once.follows);
+    });
   };
   if (follow.follows > 0) stretches.push_back(follow);
-  return sum(stretches) < sum(all) ? stretches : all;
+  return sum(stretches) < sum(all) ? std::move(stretches) : std::move(all);
 }
 
 // The tasks of the level in units that it divides that `is_new` accepts, as what follows one of them.
