@@ -78,9 +78,9 @@ class JoinBase : public AnyWaitable {
 
   redag::Mutex lock_;  // of the messages
   std::vector<Input> inputs_;
-  redag::PiMutex
-      hook_lock_;      // of `arrived`, `kept` and what follows; taken after lock_, and by the middleware's threads
-  bool told_ = false;  // on_ready_ was called, and run() has not begun since
+  // Guards `arrived`, `kept` and what follows. Taken after lock_, and by the middleware's threads.
+  redag::PiMutex hook_lock_;
+  bool told_ = false;  // on_ready_ was called, and take() has not begun since
   std::function<void(std::size_t, int)> on_ready_;
 };
 
