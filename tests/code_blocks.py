@@ -80,7 +80,7 @@ class Page:
 
     def __init__(self, folder, tools, source):
         self.folder, self.tools = folder, tools
-        for name in "workloads", "experiments", "examples":
+        for name in "workloads", "evaluation", "examples":
             (folder / name).symlink_to(source / name)
         path = os.pathsep.join([str(tools.program.parent), os.environ["PATH"]])
         self.environment = {**os.environ, "PATH": path, "CMAKE_PREFIX_PATH": str(tools.prefix), "CXX": tools.cxx,
@@ -192,7 +192,7 @@ class Tools:
         self.ros = [f"-isystem {folder}" for place in newest for folder in place.parents[1].iterdir()
                     if (folder / folder.name).is_dir()]
         if self.ros:
-            self.ros += [f"-I{source / 'redag_rclcpp' / 'include'}", f"-I{self.prefix / 'include' / 'redag-internal'}"]
+            self.ros += [f"-I{source / 'ros' / 'redag_rclcpp' / 'include'}", f"-I{self.prefix / 'include' / 'redag-internal'}"]
 
 
 def main():

@@ -8,7 +8,7 @@
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_analysis/metrics/summary.hpp"
 #include "redag_analysis/sim/simulator.hpp"
-#include "redag_testing/repository.hpp"
+#include "tests/testing/repository.hpp"
 
 namespace redag {
 namespace {

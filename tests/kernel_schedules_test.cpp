@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Judges what the kernel really ran in `os` mode. Random workloads run on real threads, and the kernel's own record of
-// its context switches judges each run (redag_testing/kernel_judge.hpp). The reference scheduler, without a limit on
+// its context switches judges each run (tests/testing/kernel_judge.hpp). The reference scheduler, without a limit on
 // threads, gives the priority levels. The judgement is thus independent of the scheduler, the engine and its pool.
 //
 // The tests need SCHED_FIFO and the right to perf_event_open. They are skipped, with the reason, if one is missing.
@@ -33,10 +33,10 @@
 #include "redag_lab/run/concurrency.hpp"
 #include "redag_lab/run/run_workload.hpp"
 #include "redag_lab/run/synthetic.hpp"
-#include "redag_testing/builders.hpp"
-#include "redag_testing/environment.hpp"
-#include "redag_testing/kernel_judge.hpp"
-#include "redag_testing/reference_scheduler.hpp"
+#include "tests/testing/builders.hpp"
+#include "tests/testing/environment.hpp"
+#include "tests/testing/kernel_judge.hpp"
+#include "tests/testing/reference_scheduler.hpp"
 
 namespace redag::testing {
 namespace {

@@ -40,7 +40,7 @@ def first_cells(page, heading):
 
 class Pages(unittest.TestCase):
     def test_ros2_lists_the_parameters(self):
-        sources = [f for f in SOURCE.glob("redag_rclcpp/src/**/*.cpp")
+        sources = [f for f in SOURCE.glob("ros/redag_rclcpp/src/**/*.cpp")
                    if f.name in ("options.cpp", "parameter_reader.cpp", "monitor_options.cpp")]
         self.assertEqual(len(sources), 3, sources)
         text = "".join(file.read_text(encoding="utf-8") for file in sources)

@@ -95,7 +95,7 @@ class SchemaTest(unittest.TestCase):
         jsonschema.Draft7Validator.check_schema(SCHEMA)
 
     def test_shipped_workloads_satisfy_it(self):
-        files = [file for folder in ("workloads", "redag_rclcpp/config") for file in sorted((ROOT / folder).rglob("*.yaml"))]
+        files = [file for folder in ("workloads", "ros/redag_rclcpp/config") for file in sorted((ROOT / folder).rglob("*.yaml"))]
         self.assertGreaterEqual(len(files), 9)
         for file in files:
             with self.subTest(file=file.name):

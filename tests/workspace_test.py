@@ -9,6 +9,7 @@ Usage: workspace_test.py SOURCE_DIR. Uses the standard library only, and colcon 
 does not know stops the whole installation. A new dependency therefore gets its line here, copied from ros/rosdistro
 (rosdep/base.yaml). tools/test_documented_build builds the packages.
 """
+import os
 import pathlib
 import re
 import shutil
@@ -55,31 +56,35 @@ OPTIONAL = {"redag_rclcpp": {"cm_executors"},
                                  "geometry_msgs", "nav2_controller", "nav2_msgs", "nav_msgs",
                                  "rclcpp_action", "rosbag2_cpp", "rosbag2_storage", "rosbag2_transport", "tf2_ros"}}
 # Folders of the repository that a package uses where they are there, and does without elsewhere.
-BESIDE = ("../benchmarks/counted", "../redag_testing")
+BESIDE = ("../../evaluation/benchmarks/counted", "../../tests/testing")
 ROS_PACKAGES = ("redag_rclcpp", "redag_rclcpp_lab")
 PACKAGES = ("redag", "redag_analysis", "redag_lab", *ROS_PACKAGES)
 
 
+def folder_of(package):
+    return SOURCE / "ros" / package if package in ROS_PACKAGES else SOURCE / package
+
+
 def version_of(package):
-    return xml.etree.ElementTree.parse(SOURCE / package / "package.xml").getroot().findtext("version")
+    return xml.etree.ElementTree.parse(folder_of(package) / "package.xml").getroot().findtext("version")
 
 
 def files_of(package, *endings):
     """Returns the files of a package with these endings, without what others wrote."""
-    return [file for file in sorted((SOURCE / package).rglob("*"))
+    return [file for file in sorted((folder_of(package)).rglob("*"))
             if file.name.endswith(endings) and "third_party" not in file.parts]
 
 
 def looked_for(package):
     """Returns the names of the packages that a CMakeLists.txt looks for, and cannot do without."""
-    text = re.sub(r"#.*", "", (SOURCE / package / "CMakeLists.txt").read_text())
+    text = re.sub(r"#.*", "", (folder_of(package) / "CMakeLists.txt").read_text())
     in_lists = {name for items, _ in re.findall(
         r"foreach\(package IN ITEMS ([^)]*)\)\s*find_package\((\$\{package\}) REQUIRED\)", text) for name in items.split()}
     return in_lists | set(re.findall(r"find_package\((\w[\w-]*)[^)]*REQUIRED\)", text))
 
 
 def keys_of(package):
-    root = xml.etree.ElementTree.parse(SOURCE / package / "package.xml").getroot()
+    root = xml.etree.ElementTree.parse(folder_of(package) / "package.xml").getroot()
     return {element.text.strip() for element in root if element.tag.endswith("depend")}
 
 
@@ -149,7 +154,7 @@ class Rosdep(unittest.TestCase):
         """colcon builds the libraries and the program. The repository's own build holds their tests."""
         for package in ("redag", "redag_analysis", "redag_lab"):
             self.assertFalse({"librapidcheck-dev", "rapidcheck"} & keys_of(package))
-            self.assertNotIn("BUILD_TESTING", (SOURCE / package / "CMakeLists.txt").read_text())
+            self.assertNotIn("BUILD_TESTING", (folder_of(package) / "CMakeLists.txt").read_text())
 
 
 class Alone(unittest.TestCase):
@@ -169,14 +174,14 @@ class Alone(unittest.TestCase):
 
     def test_no_link_leaves_its_folder(self):
         for package in PACKAGES:
-            for file in (SOURCE / package).rglob("*"):
+            for file in (folder_of(package)).rglob("*"):
                 if file.is_symlink():
-                    self.assertIn(SOURCE / package, file.resolve().parents, file)
+                    self.assertIn(folder_of(package), file.resolve().parents, file)
 
     def test_all_have_one_version(self):
         self.assertEqual({version_of(package) for package in PACKAGES}, {version_of("redag")})
         for package in PACKAGES:
-            text = (SOURCE / package / "CMakeLists.txt").read_text()
+            text = (folder_of(package) / "CMakeLists.txt").read_text()
             self.assertRegex(text, rf"project\({package} VERSION \$\{{version\}} ")
 
 
@@ -186,7 +191,7 @@ class Release(unittest.TestCase):
     def test_the_changelog_begins_with_the_version(self):
         """bloom makes the changelog of the Debian package of the entry with the version of package.xml."""
         for package in PACKAGES:
-            text = (SOURCE / package / "CHANGELOG.rst").read_text()
+            text = (folder_of(package) / "CHANGELOG.rst").read_text()
             line, title, again, _, entry, under = text.splitlines()[:6]
             self.assertEqual((line, title, again), ("^" * len(title), f"Changelog for package {package}", line))
             if entry != "Forthcoming":
@@ -195,18 +200,19 @@ class Release(unittest.TestCase):
 
     def test_each_package_has_its_pages(self):
         for package in PACKAGES:
-            self.assertTrue((SOURCE / package / "rosdoc2.yaml").is_file(), package)
-            page = (SOURCE / package / "README.md").read_text()
+            self.assertTrue((folder_of(package) / "rosdoc2.yaml").is_file(), package)
+            page = (folder_of(package) / "README.md").read_text()
             self.assertTrue(page.startswith(f"# {package}\n"), package)
-            self.assertIn("](../QUALITY_DECLARATION.md)", page, package)
+            declaration = os.path.relpath(SOURCE / "QUALITY_DECLARATION.md", folder_of(package))
+            self.assertIn(f"]({declaration})", page, package)
 
     def test_licences_have_their_texts(self):
         for package in PACKAGES:
-            root = xml.etree.ElementTree.parse(SOURCE / package / "package.xml").getroot()
+            root = xml.etree.ElementTree.parse(folder_of(package) / "package.xml").getroot()
             self.assertEqual(root.findtext("license"), "Apache-2.0", package)
             for licence in root.iter("license"):
                 if licence.get("file"):
-                    self.assertTrue((SOURCE / package / licence.get("file")).is_file(), package)
+                    self.assertTrue((folder_of(package) / licence.get("file")).is_file(), package)
 
 
 if __name__ == "__main__":

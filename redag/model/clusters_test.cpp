@@ -14,7 +14,7 @@
 
 #include "redag/model/validate.hpp"
 #include "redag/model/workload_yaml.hpp"
-#include "redag_testing/builders.hpp"
+#include "tests/testing/builders.hpp"
 
 namespace redag {
 namespace {

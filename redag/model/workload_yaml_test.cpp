@@ -16,7 +16,7 @@
 #include "redag/model/clusters.hpp"
 #include "redag/model/validate.hpp"
 #include "redag_lab/workload/generate.hpp"
-#include "redag_testing/repository.hpp"
+#include "tests/testing/repository.hpp"
 
 namespace redag {
 namespace {

@@ -20,8 +20,8 @@
 #include "redag/runtime/coroutine_body.hpp"
 #include "redag/runtime/engine.hpp"
 #include "redag/sched/priority_scheduler.hpp"
-#include "redag_testing/builders.hpp"
-#include "redag_testing/every_mode.hpp"
+#include "tests/testing/builders.hpp"
+#include "tests/testing/every_mode.hpp"
 
 namespace redag::runtime {
 namespace {

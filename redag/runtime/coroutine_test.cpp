@@ -20,9 +20,9 @@
 #include "redag/runtime/async_event.hpp"
 #include "redag/runtime/executor.hpp"
 #include "redag/runtime/preemption_point.hpp"
-#include "redag_testing/allocation_counter.hpp"
-#include "redag_testing/every_mode.hpp"
-#include "redag_testing/one_worker.hpp"
+#include "tests/testing/allocation_counter.hpp"
+#include "tests/testing/every_mode.hpp"
+#include "tests/testing/one_worker.hpp"
 
 namespace redag::runtime {
 namespace {

@@ -11,8 +11,8 @@
 #include "redag/model/workload_yaml.hpp"
 #include "redag/runtime/executor.hpp"
 #include "redag/trace/output_file.hpp"
-#include "redag_testing/one_worker.hpp"
-#include "redag_testing/repository.hpp"
+#include "tests/testing/one_worker.hpp"
+#include "tests/testing/repository.hpp"
 
 namespace redag::runtime {
 namespace {

@@ -19,9 +19,9 @@
 #include "redag/runtime/async_event.hpp"
 #include "redag/runtime/coroutine.hpp"
 #include "redag/runtime/executor.hpp"
-#include "redag_testing/every_mode.hpp"
-#include "redag_testing/one_worker.hpp"
-#include "redag_testing/recorded_run.hpp"
+#include "tests/testing/every_mode.hpp"
+#include "tests/testing/one_worker.hpp"
+#include "tests/testing/recorded_run.hpp"
 
 namespace redag::runtime {
 namespace {

@@ -20,9 +20,9 @@
 #include "redag/runtime/engine.hpp"
 #include "redag/runtime/running_job.hpp"
 #include "redag/sched/priority_scheduler.hpp"
-#include "redag_testing/builders.hpp"
-#include "redag_testing/every_mode.hpp"
-#include "redag_testing/stepped_clock.hpp"
+#include "tests/testing/builders.hpp"
+#include "tests/testing/every_mode.hpp"
+#include "tests/testing/stepped_clock.hpp"
 
 namespace {
 /// What a wake-up takes, in nanoseconds on the stepped clock.

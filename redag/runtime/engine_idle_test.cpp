@@ -15,8 +15,8 @@
 #include "redag/runtime/engine.hpp"
 #include "redag/runtime/threads.hpp"
 #include "redag/sched/priority_scheduler.hpp"
-#include "redag_testing/builders.hpp"
-#include "redag_testing/every_mode.hpp"
+#include "tests/testing/builders.hpp"
+#include "tests/testing/every_mode.hpp"
 
 namespace redag::runtime {
 namespace {

@@ -15,7 +15,7 @@
 #include "redag/runtime/preemption_point.hpp"
 #include "redag/runtime/threads.hpp"
 #include "redag/sched/priority_scheduler.hpp"
-#include "redag_testing/builders.hpp"
+#include "tests/testing/builders.hpp"
 
 namespace redag::runtime {
 namespace {

@@ -16,9 +16,9 @@
 #include "redag/runtime/coroutine_body.hpp"
 #include "redag/runtime/preemption_point.hpp"
 #include "redag/sched/priority_scheduler.hpp"
-#include "redag_testing/allocation_counter.hpp"
-#include "redag_testing/builders.hpp"
-#include "redag_testing/every_mode.hpp"
+#include "tests/testing/allocation_counter.hpp"
+#include "tests/testing/builders.hpp"
+#include "tests/testing/every_mode.hpp"
 
 namespace redag::runtime {
 namespace {

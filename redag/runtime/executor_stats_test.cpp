@@ -15,7 +15,7 @@
 #include "redag/runtime/executor.hpp"
 #include "redag/runtime/parker.hpp"
 #include "redag/runtime/preemption_point.hpp"
-#include "redag_testing/one_worker.hpp"
+#include "tests/testing/one_worker.hpp"
 
 namespace redag::runtime {
 namespace {

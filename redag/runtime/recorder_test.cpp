@@ -22,8 +22,8 @@
 #include "redag/trace/events_file.hpp"
 #include "redag_analysis/metrics/summary.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"
-#include "redag_testing/one_worker.hpp"
-#include "redag_testing/recorded_run.hpp"
+#include "tests/testing/one_worker.hpp"
+#include "tests/testing/recorded_run.hpp"
 
 namespace redag::runtime {
 namespace {

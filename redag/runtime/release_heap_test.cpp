@@ -7,7 +7,7 @@
 #include <array>
 
 #include "redag/model/demand.hpp"
-#include "redag_testing/builders.hpp"
+#include "tests/testing/builders.hpp"
 
 namespace redag::runtime {
 namespace {

@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "redag/runtime/executor.hpp"
-#include "redag_testing/one_worker.hpp"
+#include "tests/testing/one_worker.hpp"
 
 namespace redag::runtime {
 namespace {

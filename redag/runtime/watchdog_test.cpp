@@ -18,7 +18,7 @@
 #include "redag/runtime/executor.hpp"
 #include "redag/runtime/preemption_point.hpp"
 #include "redag/sched/priority_scheduler.hpp"
-#include "redag_testing/builders.hpp"
+#include "tests/testing/builders.hpp"
 
 namespace redag::runtime {
 namespace {

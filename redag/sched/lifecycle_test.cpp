@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "redag/sched/lifecycle_rules.hpp"
-#include "redag_testing/builders.hpp"
+#include "tests/testing/builders.hpp"
 
 namespace redag::sched {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "redag/base/rng.hpp"
 #include "redag/sched/priority_scheduler.hpp"
-#include "redag_testing/builders.hpp"
+#include "tests/testing/builders.hpp"
 
 namespace redag::sched {
 namespace {

@@ -11,9 +11,9 @@
 #include <gtest/gtest.h>
 
 #include "redag/base/rng.hpp"
-#include "redag_testing/allocation_counter.hpp"
-#include "redag_testing/builders.hpp"
-#include "redag_testing/manual_workers.hpp"
+#include "tests/testing/allocation_counter.hpp"
+#include "tests/testing/builders.hpp"
+#include "tests/testing/manual_workers.hpp"
 
 namespace redag::sched {
 namespace {

@@ -13,7 +13,7 @@
 #include "redag/model/workload_yaml.hpp"
 #include "redag/trace/output_file.hpp"
 #include "redag/trace/run_info_json.hpp"
-#include "redag_testing/builders.hpp"
+#include "tests/testing/builders.hpp"
 
 namespace redag::trace {
 namespace {

@@ -16,7 +16,7 @@
 
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/output_file.hpp"
-#include "redag_testing/builders.hpp"
+#include "tests/testing/builders.hpp"
 
 namespace redag::trace {
 namespace {

@@ -9,7 +9,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "redag_testing/builders.hpp"
+#include "tests/testing/builders.hpp"
 
 namespace redag::trace {
 namespace {

@@ -16,9 +16,9 @@
 #include "redag_analysis/many_workers/suspension_aware.hpp"
 #include "redag_analysis/one_worker/response_time.hpp"
 #include "redag_analysis/sim/simulator.hpp"
-#include "redag_testing/bound_property.hpp"
-#include "redag_testing/builders.hpp"
-#include "redag_testing/random_workloads.hpp"
+#include "tests/testing/bound_property.hpp"
+#include "tests/testing/builders.hpp"
+#include "tests/testing/random_workloads.hpp"
 
 namespace redag::analysis {
 namespace {

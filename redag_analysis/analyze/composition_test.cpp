@@ -10,9 +10,9 @@
 
 #include "redag/model/workload_yaml.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
-#include "redag_testing/bound_property.hpp"
-#include "redag_testing/random_workloads.hpp"
-#include "redag_testing/repository.hpp"
+#include "tests/testing/bound_property.hpp"
+#include "tests/testing/random_workloads.hpp"
+#include "tests/testing/repository.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -16,8 +16,8 @@
 #include "redag_analysis/core/arithmetic.hpp"
 #include "redag_lab/search/audsley.hpp"
 #include "redag_lab/search/sensitivity.hpp"
-#include "redag_testing/bound_property.hpp"
-#include "redag_testing/exploration/exploration.hpp"
+#include "tests/testing/bound_property.hpp"
+#include "tests/testing/exploration/exploration.hpp"
 
 namespace redag::analysis {
 namespace {

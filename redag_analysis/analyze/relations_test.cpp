@@ -13,7 +13,7 @@
 #include "redag_analysis/one_worker/response_time.hpp"
 #include "redag_analysis/one_worker/utilization.hpp"
 #include "redag_analysis/sim/simulator.hpp"
-#include "redag_testing/bound_property.hpp"
+#include "tests/testing/bound_property.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "redag_analysis/analyze/executors.hpp"
-#include "redag_testing/bound_property.hpp"
-#include "redag_testing/random_workloads.hpp"
+#include "tests/testing/bound_property.hpp"
+#include "tests/testing/random_workloads.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -4,7 +4,7 @@
 #include "redag_analysis/core/jobs_in_progress.hpp"
 
 #include <gtest/gtest.h>
-#include "redag_testing/builders.hpp"
+#include "tests/testing/builders.hpp"
 
 namespace redag::analysis {
 namespace {

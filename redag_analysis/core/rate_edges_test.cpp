@@ -17,10 +17,10 @@
 #include "redag_analysis/many_workers/global_sequential.hpp"
 #include "redag_analysis/many_workers/suspension_aware.hpp"
 #include "redag_analysis/one_worker/response_time.hpp"
-#include "redag_testing/bound_property.hpp"
-#include "redag_testing/builders.hpp"
-#include "redag_testing/random_workloads.hpp"
-#include "redag_testing/repository.hpp"
+#include "tests/testing/bound_property.hpp"
+#include "tests/testing/builders.hpp"
+#include "tests/testing/random_workloads.hpp"
+#include "tests/testing/repository.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -10,8 +10,8 @@
 #include "redag_analysis/one_worker/edf_demand.hpp"
 #include "redag_analysis/one_worker/response_time.hpp"
 #include "redag_analysis/one_worker/utilization.hpp"
-#include "redag_testing/bound_property.hpp"
-#include "redag_testing/builders.hpp"
+#include "tests/testing/bound_property.hpp"
+#include "tests/testing/builders.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -13,8 +13,8 @@
 
 #include "redag/base/rng.hpp"
 #include "redag_analysis/executors/executors.hpp"
-#include "redag_testing/named_executor.hpp"
-#include "redag_testing/random_workloads.hpp"
+#include "tests/testing/named_executor.hpp"
+#include "tests/testing/random_workloads.hpp"
 
 namespace redag::executors {
 namespace {

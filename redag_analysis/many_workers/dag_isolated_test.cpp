@@ -7,8 +7,8 @@
 
 #include <algorithm>
 
-#include "redag_testing/bound_property.hpp"
-#include "redag_testing/builders.hpp"
+#include "tests/testing/bound_property.hpp"
+#include "tests/testing/builders.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -11,8 +11,8 @@
 #include "redag_analysis/core/rate_edges.hpp"
 #include "redag_analysis/many_workers/dag_isolated.hpp"
 #include "redag_analysis/many_workers/global_dag.hpp"
-#include "redag_testing/bound_property.hpp"
-#include "redag_testing/builders.hpp"
+#include "tests/testing/bound_property.hpp"
+#include "tests/testing/builders.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -9,8 +9,8 @@
 
 #include "redag_analysis/many_workers/global_sequential.hpp"
 #include "redag_analysis/one_worker/edf_demand.hpp"
-#include "redag_testing/bound_property.hpp"
-#include "redag_testing/builders.hpp"
+#include "tests/testing/bound_property.hpp"
+#include "tests/testing/builders.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -13,8 +13,8 @@
 #include <variant>
 #include <vector>
 
-#include "redag_testing/bound_property.hpp"
-#include "redag_testing/builders.hpp"
+#include "tests/testing/bound_property.hpp"
+#include "tests/testing/builders.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -11,9 +11,9 @@
 #include <fmt/format.h>
 
 #include "redag_analysis/one_worker/response_time.hpp"
-#include "redag_testing/bound_property.hpp"
-#include "redag_testing/builders.hpp"
-#include "redag_testing/random_workloads.hpp"
+#include "tests/testing/bound_property.hpp"
+#include "tests/testing/builders.hpp"
+#include "tests/testing/random_workloads.hpp"
 
 namespace redag::analysis {
 namespace {

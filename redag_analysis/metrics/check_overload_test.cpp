@@ -6,9 +6,9 @@
 
 #include <gtest/gtest.h>
 
-#include "redag_testing/builders.hpp"
-#include "redag_testing/expect_trace.hpp"
-#include "redag_testing/trace_builder.hpp"
+#include "tests/testing/builders.hpp"
+#include "tests/testing/expect_trace.hpp"
+#include "tests/testing/trace_builder.hpp"
 
 namespace redag::metrics {
 namespace {

@@ -12,8 +12,8 @@
 
 #include "redag/trace/output_file.hpp"
 #include "redag_analysis/metrics/jobs_csv.hpp"
-#include "redag_testing/builders.hpp"
-#include "redag_testing/trace_builder.hpp"
+#include "tests/testing/builders.hpp"
+#include "tests/testing/trace_builder.hpp"
 
 namespace redag::metrics {
 namespace {

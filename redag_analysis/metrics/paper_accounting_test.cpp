@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "redag_testing/builders.hpp"
+#include "tests/testing/builders.hpp"
 
 namespace redag::metrics {
 namespace {

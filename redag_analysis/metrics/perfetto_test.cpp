@@ -15,11 +15,11 @@
 #include "redag/trace/output_file.hpp"
 #include "redag_analysis/metrics/jobs.hpp"
 #include "redag_analysis/metrics/protobuf.hpp"
-#include "redag_testing/builders.hpp"
-#include "redag_testing/perfetto_reader.hpp"
-#include "redag_testing/random_workloads.hpp"
-#include "redag_testing/timeline.hpp"
-#include "redag_testing/trace_builder.hpp"
+#include "tests/testing/builders.hpp"
+#include "tests/testing/perfetto_reader.hpp"
+#include "tests/testing/random_workloads.hpp"
+#include "tests/testing/timeline.hpp"
+#include "tests/testing/trace_builder.hpp"
 
 namespace redag::metrics {
 namespace {

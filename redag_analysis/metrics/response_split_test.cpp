@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "redag_analysis/metrics/jobs.hpp"
-#include "redag_testing/builders.hpp"
-#include "redag_testing/trace_builder.hpp"
+#include "tests/testing/builders.hpp"
+#include "tests/testing/trace_builder.hpp"
 
 namespace redag::metrics {
 namespace {

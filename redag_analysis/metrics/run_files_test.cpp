@@ -8,8 +8,8 @@
 
 #include <filesystem>
 
-#include "redag_testing/builders.hpp"
-#include "redag_testing/trace_builder.hpp"
+#include "tests/testing/builders.hpp"
+#include "tests/testing/trace_builder.hpp"
 
 namespace redag::metrics {
 namespace {

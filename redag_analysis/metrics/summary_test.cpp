@@ -9,8 +9,8 @@
 
 #include "redag_analysis/metrics/perfetto.hpp"
 #include "redag_analysis/metrics/summary_json.hpp"
-#include "redag_testing/builders.hpp"
-#include "redag_testing/trace_builder.hpp"
+#include "tests/testing/builders.hpp"
+#include "tests/testing/trace_builder.hpp"
 
 namespace redag::metrics {
 namespace {

@@ -14,9 +14,9 @@
 #include "redag_analysis/metrics/why.hpp"
 #include "redag_analysis/metrics/why_remedy.hpp"
 #include "redag_analysis/metrics/why_text.hpp"
-#include "redag_testing/builders.hpp"
-#include "redag_testing/random_workloads.hpp"
-#include "redag_testing/timeline.hpp"
+#include "tests/testing/builders.hpp"
+#include "tests/testing/random_workloads.hpp"
+#include "tests/testing/timeline.hpp"
 
 namespace redag::metrics {
 namespace {

@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "redag_analysis/metrics/why_text.hpp"
-#include "redag_testing/builders.hpp"
-#include "redag_testing/repository.hpp"
-#include "redag_testing/timeline.hpp"
+#include "tests/testing/builders.hpp"
+#include "tests/testing/repository.hpp"
+#include "tests/testing/timeline.hpp"
 
 namespace redag::metrics {
 namespace {

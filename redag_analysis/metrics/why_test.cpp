@@ -15,10 +15,10 @@
 #include "redag/model/demand.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/why_text.hpp"
-#include "redag_testing/builders.hpp"
-#include "redag_testing/random_workloads.hpp"
-#include "redag_testing/timeline.hpp"
-#include "redag_testing/trace_builder.hpp"
+#include "tests/testing/builders.hpp"
+#include "tests/testing/random_workloads.hpp"
+#include "tests/testing/timeline.hpp"
+#include "tests/testing/trace_builder.hpp"
 
 namespace redag::metrics {
 namespace {

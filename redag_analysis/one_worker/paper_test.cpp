@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "redag_testing/bound_property.hpp"
+#include "tests/testing/bound_property.hpp"
 
 namespace redag::analysis {
 namespace {

@@ -10,8 +10,8 @@
 
 #include "redag_analysis/analyze/executors.hpp"
 #include "redag_analysis/peers/wait_set_rates.hpp"
-#include "redag_testing/bound_property.hpp"
-#include "redag_testing/builders.hpp"
+#include "tests/testing/bound_property.hpp"
+#include "tests/testing/builders.hpp"
 
 namespace redag::analysis {
 namespace {

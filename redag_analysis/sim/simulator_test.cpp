@@ -13,9 +13,9 @@
 #include "redag/base/rng.hpp"
 
 #include "redag/sched/priority_scheduler.hpp"
-#include "redag_testing/builders.hpp"
-#include "redag_testing/random_workloads.hpp"
-#include "redag_testing/timeline.hpp"
+#include "tests/testing/builders.hpp"
+#include "tests/testing/random_workloads.hpp"
+#include "tests/testing/timeline.hpp"
 
 namespace redag::sim {
 namespace {

@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include "redag_testing/builders.hpp"
-#include "redag_testing/timeline.hpp"
+#include "tests/testing/builders.hpp"
+#include "tests/testing/timeline.hpp"
 
 namespace redag::sim {
 namespace {

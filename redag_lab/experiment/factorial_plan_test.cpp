@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include "redag_testing/repository.hpp"
+#include "tests/testing/repository.hpp"
 
 namespace redag::experiment {
 namespace {

@@ -12,7 +12,7 @@
 
 #include "redag_analysis/metrics/trace_checker.hpp"
 #include "redag_analysis/sim/simulator.hpp"
-#include "redag_testing/timeline.hpp"
+#include "tests/testing/timeline.hpp"
 
 namespace redag::experiment {
 namespace {

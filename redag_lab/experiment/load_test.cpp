@@ -10,7 +10,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "redag_testing/repository.hpp"
+#include "tests/testing/repository.hpp"
 
 namespace redag::experiment {
 namespace {

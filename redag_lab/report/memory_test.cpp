@@ -8,9 +8,9 @@
 #include <filesystem>
 
 #include "redag_lab/report/digest.hpp"
-#include "redag_testing/allocation_counter.hpp"
-#include "redag_testing/builders.hpp"
-#include "redag_testing/timeline.hpp"
+#include "tests/testing/allocation_counter.hpp"
+#include "tests/testing/builders.hpp"
+#include "tests/testing/timeline.hpp"
 
 namespace redag::report {
 namespace {

@@ -9,9 +9,9 @@
 
 #include "redag_lab/report/document.hpp"
 #include "redag_lab/report/verdict.hpp"
-#include "redag_testing/builders.hpp"
-#include "redag_testing/timeline.hpp"
-#include "redag_testing/trace_builder.hpp"
+#include "tests/testing/builders.hpp"
+#include "tests/testing/timeline.hpp"
+#include "tests/testing/trace_builder.hpp"
 
 namespace redag::report {
 namespace {

@@ -9,8 +9,8 @@
 
 #include "redag_lab/report/schedule.hpp"
 #include "redag_lab/report/timeline.hpp"
-#include "redag_testing/builders.hpp"
-#include "redag_testing/trace_builder.hpp"
+#include "tests/testing/builders.hpp"
+#include "tests/testing/trace_builder.hpp"
 
 namespace redag::report {
 namespace {

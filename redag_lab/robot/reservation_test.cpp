@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "redag/base/rng.hpp"
-#include "redag_testing/random_workloads.hpp"
+#include "tests/testing/random_workloads.hpp"
 
 namespace redag::robot {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "redag/model/text_file.hpp"
 #include "redag_lab/robot/input.hpp"
-#include "redag_testing/repository.hpp"
+#include "tests/testing/repository.hpp"
 
 namespace redag::robot {
 namespace {

@@ -14,9 +14,9 @@
 #include "redag/sched/policy.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
 #include "redag_lab/search/analysed.hpp"
-#include "redag_testing/bound_property.hpp"
-#include "redag_testing/builders.hpp"
-#include "redag_testing/random_workloads.hpp"
+#include "tests/testing/bound_property.hpp"
+#include "tests/testing/builders.hpp"
+#include "tests/testing/random_workloads.hpp"
 
 namespace redag::robot {
 namespace {

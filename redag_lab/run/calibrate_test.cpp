@@ -9,7 +9,7 @@
 
 #include "redag/model/validate.hpp"
 #include "redag_lab/run/stall_probe.hpp"
-#include "redag_testing/trace_builder.hpp"
+#include "tests/testing/trace_builder.hpp"
 
 namespace redag::lab {
 namespace {

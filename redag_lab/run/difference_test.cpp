@@ -8,7 +8,7 @@
 
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/sim/simulator.hpp"
-#include "redag_testing/builders.hpp"
+#include "tests/testing/builders.hpp"
 
 namespace redag::lab {
 namespace {

@@ -20,8 +20,8 @@
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_analysis/metrics/summary.hpp"
 #include "redag_lab/run/run_workload.hpp"
-#include "redag_testing/builders.hpp"
-#include "redag_testing/recorded_run.hpp"
+#include "tests/testing/builders.hpp"
+#include "tests/testing/recorded_run.hpp"
 
 namespace redag::lab {
 namespace {

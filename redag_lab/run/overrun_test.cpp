@@ -14,7 +14,7 @@
 #include "redag_analysis/metrics/assumptions.hpp"
 #include "redag_lab/run/run_workload.hpp"
 #include "redag_lab/run/synthetic.hpp"
-#include "redag_testing/builders.hpp"
+#include "tests/testing/builders.hpp"
 
 namespace redag::lab {
 namespace {

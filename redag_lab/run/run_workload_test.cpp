@@ -19,7 +19,7 @@
 #include "redag/runtime/threads.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"
-#include "redag_testing/builders.hpp"
+#include "tests/testing/builders.hpp"
 
 namespace redag::lab {
 namespace {

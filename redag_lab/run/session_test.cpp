@@ -10,7 +10,7 @@
 
 #include "redag/trace/events_file.hpp"
 #include "redag_analysis/metrics/summary_json.hpp"
-#include "redag_testing/builders.hpp"
+#include "tests/testing/builders.hpp"
 
 namespace redag::lab {
 namespace {

@@ -10,9 +10,9 @@
 #include <numeric>
 
 #include "redag_analysis/analyze/analyze.hpp"
-#include "redag_testing/bound_property.hpp"
-#include "redag_testing/builders.hpp"
-#include "redag_testing/random_workloads.hpp"
+#include "tests/testing/bound_property.hpp"
+#include "tests/testing/builders.hpp"
+#include "tests/testing/random_workloads.hpp"
 
 namespace redag::lab {
 namespace {

@@ -9,8 +9,8 @@
 #include "redag/model/validate.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_analysis/sim/simulator.hpp"
-#include "redag_testing/bound_property.hpp"
-#include "redag_testing/builders.hpp"
+#include "tests/testing/bound_property.hpp"
+#include "tests/testing/builders.hpp"
 
 namespace redag::lab {
 namespace {

@@ -10,8 +10,8 @@
 
 #include "redag/model/validate.hpp"
 #include "redag/model/workload_yaml.hpp"
-#include "redag_testing/bound_property.hpp"
-#include "redag_testing/builders.hpp"
+#include "tests/testing/bound_property.hpp"
+#include "tests/testing/builders.hpp"
 
 namespace redag::lab {
 namespace {

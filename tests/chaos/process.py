@@ -114,7 +114,7 @@ def some_command(rng, folder):
         ["run", file, "--duration", "20s", "--preemption", rng.choice(["none", "cooperative"]), *out],
         ["simulate", file, "--duration", "20000s", *out],
         ["compare", file, "--duration", "1s", "--executors", "redag-none,mte", "--repeat", "20", *out],
-        ["experiment", SOURCE / "experiments" / "acceptance_dags.yaml", *out],
+        ["experiment", SOURCE / "evaluation" / "experiments" / "acceptance_dags.yaml", *out],
         ["sensitivity", SOURCE / "workloads" / "robot.yaml", "--simulate"],
     ])
 

@@ -9,8 +9,8 @@
 #include "redag_analysis/metrics/jobs.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"
 #include "redag_analysis/sim/simulator.hpp"
-#include "redag_testing/random_workloads.hpp"
 #include "tests/chaos/chaos.hpp"
+#include "tests/testing/random_workloads.hpp"
 
 namespace redag::chaos {
 namespace {

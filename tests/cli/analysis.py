@@ -288,7 +288,7 @@ dags:
             self.expect(redag("analyze", file, "--preemption", "none"), 0)
 
     def test_workloads_of_the_ros_package(self):
-        files = sorted((SOURCE / "redag_rclcpp" / "config").rglob("*.yaml"))
+        files = sorted((SOURCE / "ros" / "redag_rclcpp" / "config").rglob("*.yaml"))
         self.assertGreaterEqual(len(files), 2)
         for file in files:
             self.expect(redag("validate", "--strict", file), 0)

@@ -56,7 +56,7 @@ class Examples(Case):
         super().setUp()
         for shipped in ("workloads", "examples"):
             (self.folder / shipped).symlink_to(SOURCE / shipped)
-        for plan in (SOURCE / "experiments").rglob("*.yaml"):
+        for plan in (SOURCE / "evaluation" / "experiments").rglob("*.yaml"):
             text = plan.read_text()
             for pattern, less in FEWER.items():
                 text = re.sub(pattern, less, text)
@@ -148,7 +148,7 @@ class Examples(Case):
             one_line_each = re.sub(r" \\\n\s+", " ", examples.strip())
             for example in map(str.strip, one_line_each.splitlines()):
                 with self.subTest(example):
-                    for file in re.findall(r"\b(?:workloads|experiments)/\w\S*\.yaml", example):
+                    for file in re.findall(r"\b(?:workloads|evaluation)/\w\S*\.yaml", example):
                         self.assertTrue((SOURCE / file).exists(), example)
                     reason = self.lacking(command, example)
                     if reason:

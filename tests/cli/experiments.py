@@ -296,7 +296,7 @@ exec "{PROGRAM}" simulate "$1" --executor "$executor" --duration "$duration" --w
 
     @unittest.skipIf(SANITIZED, "a unit of some plans takes minutes there")
     def test_plans_of_this_repository(self):
-        plans = sorted((SOURCE / "experiments" / "paper").glob("*.yaml"))
+        plans = sorted((SOURCE / "evaluation" / "experiments" / "paper").glob("*.yaml"))
         self.assertGreater(len(plans), 5)
         for plan in plans:
             if "world: ros2" in plan.read_text():

@@ -6,7 +6,7 @@
 
 #include <string>
 
-#include "redag_testing/explorer.hpp"
+#include "tests/testing/explorer.hpp"
 
 namespace redag::detail {
 

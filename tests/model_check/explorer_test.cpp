@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_testing/explorer.hpp"
+#include "tests/testing/explorer.hpp"
 
 #include <gtest/gtest.h>
 #include <rapidcheck.h>

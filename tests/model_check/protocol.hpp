@@ -19,8 +19,8 @@
 #include "redag/runtime/preemption_point.hpp"
 #include "redag/runtime/running_job.hpp"
 #include "redag/sched/priority_scheduler.hpp"
-#include "redag_testing/builders.hpp"
-#include "redag_testing/explorer.hpp"
+#include "tests/testing/builders.hpp"
+#include "tests/testing/explorer.hpp"
 
 namespace redag::model_check {
 

@@ -8,7 +8,7 @@
 #include "redag/runtime/executor.hpp"
 #include "redag/runtime/release_thread.hpp"
 #include "redag/runtime/release_timer.hpp"
-#include "redag_testing/builders.hpp"
+#include "tests/testing/builders.hpp"
 
 namespace redag::model_check {
 namespace {

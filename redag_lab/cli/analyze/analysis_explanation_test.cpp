@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-#include "redag_testing/builders.hpp"
+#include "tests/testing/builders.hpp"
 
 namespace redag::cli {
 namespace {

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "redag_lab/cli/analyze/analysis_explanation.hpp"
-#include "redag_testing/builders.hpp"
+#include "tests/testing/builders.hpp"
 
 namespace redag::cli {
 namespace {

@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <map>
 
-#include "redag_testing/builders.hpp"
+#include "tests/testing/builders.hpp"
 
 namespace redag::cli {
 namespace {

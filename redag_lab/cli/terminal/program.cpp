@@ -73,9 +73,9 @@ constexpr std::array kCommands = {
           "  redag tune workloads/robot.yaml --judge bounds --workers 4 --json\n"
           "  redag tune workloads/robot.yaml --vary max_active --caps 2-5 --all-trials\n"},
     Entry{"experiment", "Run experiments over many workloads: seeded, parallel, resumable", add_experiment,
-          "  redag experiment experiments/acceptance_tasks.yaml --out results/tasks\n"
-          "  redag experiment experiments/paper/factorial.yaml --out results/factorial\n"
-          "  redag experiment experiments/acceptance_dags.yaml --out dags --shard 1/3\n"},
+          "  redag experiment evaluation/experiments/acceptance_tasks.yaml --out results/tasks\n"
+          "  redag experiment evaluation/experiments/paper/factorial.yaml --out results/factorial\n"
+          "  redag experiment evaluation/experiments/acceptance_dags.yaml --out dags --shard 1/3\n"},
     Entry{"check-trace", "Check recorded traces against the rules of the model", add_check_trace,
           "  redag check-trace results/demo\n"
           "  redag check-trace --json results/os/events.redag\n"},

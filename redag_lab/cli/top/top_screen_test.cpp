@@ -11,7 +11,7 @@
 #include <sstream>
 
 #include "redag_lab/cli/top/frame_for_tests.hpp"
-#include "redag_testing/repository.hpp"
+#include "tests/testing/repository.hpp"
 
 namespace redag::cli {
 namespace {

@@ -8,7 +8,7 @@
 #include <atomic>
 #include <utility>
 
-#include "redag_testing/explorer.hpp"
+#include "tests/testing/explorer.hpp"
 
 namespace redag {
 

@@ -6,7 +6,7 @@
 
 #include "redag/base/lock_class.hpp"
 #include "redag/base/thread_annotations.hpp"
-#include "redag_testing/explorer.hpp"
+#include "tests/testing/explorer.hpp"
 
 namespace redag {
 

@@ -4,7 +4,7 @@
 // Replaces redag/base/thread_id.hpp: the explorer's threads are fibers of one thread of the kernel.
 #pragma once
 
-#include "redag_testing/explorer.hpp"
+#include "tests/testing/explorer.hpp"
 
 namespace redag {
 

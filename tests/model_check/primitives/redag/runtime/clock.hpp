@@ -7,7 +7,7 @@
 #include <ctime>
 
 #include "redag/base/time.hpp"
-#include "redag_testing/explorer.hpp"
+#include "tests/testing/explorer.hpp"
 
 namespace redag::runtime {
 

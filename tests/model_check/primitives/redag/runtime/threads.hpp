@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
-#include "redag_testing/explorer.hpp"
+#include "tests/testing/explorer.hpp"
 
 namespace redag::runtime {
 
