@@ -16,23 +16,12 @@
 #include "redag/base/time.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/runtime/stats.hpp"
+#include "redag/runtime/values.hpp"
 #include "redag/sched/config.hpp"
 
 namespace redag::runtime {
 
 using std::chrono::nanoseconds;
-
-/// The preemption mode of an executor on this machine.
-struct Mode {
-  PreemptionMode mode = PreemptionMode::None;  // never Auto
-  std::string reason;                          // why; empty: it was asked for
-};
-
-/// How long a job may be in progress before watch() reports it overdue. The shorter of the given limits holds.
-struct WatchLimits {
-  Duration longest = 0;  // ns; 0: not given
-  double deadlines = 0;  // multiple of the job's relative deadline; 0: not given
-};
 
 struct WatchdogOptions {
   WatchLimits limits;

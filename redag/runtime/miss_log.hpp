@@ -12,7 +12,6 @@
 #include "redag/base/ids.hpp"
 #include "redag/base/time.hpp"
 #include "redag/model/job_event.hpp"
-#include "redag/runtime/executor_options.hpp"
 #include "redag/runtime/parker.hpp"
 #include "redag/trace/ring.hpp"
 

@@ -12,8 +12,8 @@
 
 #include "redag/base/result.hpp"
 #include "redag/model/workload.hpp"
-#include "redag/runtime/executor_options.hpp"
 #include "redag/runtime/threads.hpp"
+#include "redag/runtime/values.hpp"
 #include "redag/sched/scheduler.hpp"
 
 namespace redag::runtime {

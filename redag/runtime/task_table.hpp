@@ -11,9 +11,9 @@
 
 #include "redag/base/histogram.hpp"
 #include "redag/runtime/cpu_meter.hpp"
-#include "redag/runtime/executor_options.hpp"
 #include "redag/runtime/job_body.hpp"
 #include "redag/runtime/running_job.hpp"
+#include "redag/runtime/values.hpp"
 
 namespace redag::runtime {
 
