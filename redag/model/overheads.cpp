@@ -94,22 +94,4 @@ const Overheads &plausible_overheads() {
   return kPlausible;
 }
 
-std::string Calibration::provenance() const {
-  std::string text = fmt::format("calibrated {} on {}", date.empty() ? "on an unknown day" : date,
-                                 host.empty() ? "an unknown host" : host);
-  if (!load.empty()) text += ", " + load;
-  if (duration > 0) text += ", " + humanize_duration(duration);
-  return text + (complete ? "" : ", partial: ended early");
-}
-
-Result<Overheads> Calibration::of(bool realtime_threads) const {
-  const std::optional<Overheads> &found = realtime_threads ? realtime : normal;
-  if (found) return *found;
-  return realtime_threads
-             ? make_error("the calibration has no overheads of SCHED_FIFO threads",
-                          "run 'redag calibrate' in a process that may use SCHED_FIFO, or use --preemption cooperative "
-                          "or none")
-             : make_error("the calibration has no overheads of ordinary threads", "run 'redag calibrate' again");
-}
-
 }  // namespace redag

@@ -1,19 +1,16 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What a machine adds to the jobs of a workload, as `redag calibrate` measures it, and the file that holds it
-// (docs/calibration.md). Plain values, without knowledge of how they are measured or charged. Pure functions, except
-// those that read the file.
+// What a machine adds to the jobs of a workload, as `redag calibrate` measures it (docs/calibration.md). Plain values,
+// without knowledge of how they are measured or charged. Pure functions.
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "redag/base/result.hpp"
 #include "redag/base/time.hpp"
 #include "redag/model/workload.hpp"
 
@@ -55,52 +52,9 @@ struct Overheads {
 /// before a late response raises an alarm. Never charged to a bound.
 [[nodiscard]] const Overheads &plausible_overheads();
 
-/// The distribution of one measured quantity.
-struct Measured {
-  std::string what;     // "dispatch"
-  std::string threads;  // "realtime", "normal"
-  std::string load;     // "idle", "loaded"
-  std::uint64_t samples = 0;
-  Duration p50 = 0;
-  Duration p99 = 0;
-  Duration p999 = 0;
-  Duration max = 0;
-
-  friend bool operator==(const Measured &, const Measured &) = default;
-};
-
 /// Returns true if jobs of our executor run on SCHED_FIFO threads in this mode, given the rights.
 [[nodiscard]] constexpr bool is_realtime(PreemptionMode mode) {
   return mode == PreemptionMode::Os || mode == PreemptionMode::Auto;
 }
-
-/// A machine's overheads, and their provenance.
-struct Calibration {
-  std::optional<Overheads> realtime;  // SCHED_FIFO threads; empty: the process had no right to them
-  std::optional<Overheads> normal;
-  std::string date;  // UTC, ISO 8601
-  std::string host;
-  std::string kernel;
-  std::string processor;
-  std::string rights;  // "SCHED_FIFO up to 98", "none"
-  std::string load;    // "idle", "idle and loaded"
-  std::string version;
-  Duration duration = 0;
-  std::uint32_t processors = 0;
-  bool complete = true;  // false: ended early, with the maxima until then
-  std::vector<Measured> measured;
-
-  /// For example "overheads of 2026-11-23T08:30:00Z on host (idle and loaded, 30s)".
-  [[nodiscard]] std::string provenance() const;
-  /// Returns the overheads charged to jobs on such threads. Error: they were not measured.
-  [[nodiscard]] Result<Overheads> of(bool realtime_threads) const;
-
-  friend bool operator==(const Calibration &, const Calibration &) = default;
-};
-
-[[nodiscard]] std::string to_yaml(const Calibration &calibration);
-/// Errors: all mistakes by line, or why the file cannot be read.
-[[nodiscard]] Result<Calibration> load_calibration(const std::filesystem::path &path);
-[[nodiscard]] Result<Calibration> parse_calibration(std::string_view text, std::string file_name);
 
 }  // namespace redag

@@ -13,8 +13,8 @@
 #include <span>
 
 #include "redag/base/result.hpp"
+#include "redag/model/calibration.hpp"
 #include "redag/model/job_event.hpp"
-#include "redag/model/overheads.hpp"
 #include "redag/model/workload.hpp"
 #include "redag_lab/run/stall_probe.hpp"
 

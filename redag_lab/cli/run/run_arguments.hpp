@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "redag/base/time.hpp"
-#include "redag/model/overheads.hpp"
+#include "redag/model/calibration.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/model/workload_yaml.hpp"
 #include "redag_lab/cli/terminal/console.hpp"

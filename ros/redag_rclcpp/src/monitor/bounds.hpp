@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
+#include "redag/model/calibration.hpp"
 #include "redag/model/job_event.hpp"
-#include "redag/model/overheads.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/sched/scheduler.hpp"
 #include "redag_analysis/metrics/bound_watch.hpp"

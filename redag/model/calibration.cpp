@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The text form of a calibration: docs/calibration.md.
+#include "redag/model/calibration.hpp"
+
 #include <fmt/format.h>
 
-#include "redag/model/overheads.hpp"
 #include "redag/model/text_file.hpp"
 #include "redag/model/workload_yaml_values.hpp"
 #include "redag/model/yaml_writer.hpp"
@@ -136,6 +136,24 @@ void write(Writer &out, const Measured &row) {
 }
 
 }  // namespace
+
+std::string Calibration::provenance() const {
+  std::string text = fmt::format("calibrated {} on {}", date.empty() ? "on an unknown day" : date,
+                                 host.empty() ? "an unknown host" : host);
+  if (!load.empty()) text += ", " + load;
+  if (duration > 0) text += ", " + humanize_duration(duration);
+  return text + (complete ? "" : ", partial: ended early");
+}
+
+Result<Overheads> Calibration::of(bool realtime_threads) const {
+  const std::optional<Overheads> &found = realtime_threads ? realtime : normal;
+  if (found) return *found;
+  return realtime_threads
+             ? make_error("the calibration has no overheads of SCHED_FIFO threads",
+                          "run 'redag calibrate' in a process that may use SCHED_FIFO, or use --preemption cooperative "
+                          "or none")
+             : make_error("the calibration has no overheads of ordinary threads", "run 'redag calibrate' again");
+}
 
 std::string to_yaml(const Calibration &calibration) {
   Writer out;

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag/model/overheads.hpp"
+#include "redag/model/calibration.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
