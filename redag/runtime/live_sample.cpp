@@ -3,6 +3,8 @@
 
 #include "redag/runtime/live_sample.hpp"
 
+#include "redag/runtime/stats.hpp"
+
 namespace redag::runtime {
 
 void fill(live::TaskSample &sample, const TaskFigures &figures) {

@@ -13,6 +13,7 @@
 #include "redag/base/time.hpp"
 #include "redag/model/job_event.hpp"
 #include "redag/runtime/parker.hpp"
+#include "redag/runtime/values.hpp"
 #include "redag/trace/ring.hpp"
 
 namespace redag::runtime {

@@ -13,6 +13,7 @@
 
 #include "redag/base/time.hpp"
 #include "redag/model/job_event.hpp"
+#include "redag/runtime/values.hpp"
 #include "redag/sched/config.hpp"
 
 namespace redag::runtime {
@@ -35,16 +36,6 @@ class Distribution {
 
  private:
   std::shared_ptr<const Content> content_;  // null: empty
-};
-
-/// Processor time of the ended jobs of a task.
-struct Usage {
-  std::uint64_t jobs = 0;
-  Duration total = 0;
-  Duration longest = 0;
-  std::uint64_t over_wcet = 0;
-  std::uint64_t over_budget = 0;
-  std::uint64_t overdue = 0;  // jobs that watch() reported
 };
 
 /// Deadline misses of counted jobs: those that finished late, and those that never answer. The one definition for
@@ -88,14 +79,6 @@ struct DagStats {
 
   /// True if no job of a task was missed, and no sink was later than the DAG's deadline.
   [[nodiscard]] bool met_every_deadline() const;
-};
-
-/// How a deadline was missed.
-enum class MissKind : std::uint8_t {
-  Late,      // finished after its deadline
-  EndToEnd,  // a sink finished after the deadline of its DAG
-  Skipped,   // released and never started
-  Aborted,   // threw, or was cut off at its budget
 };
 
 struct MissInfo {

@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Plain values that the engine and the users of an Executor share.
+// Plain values that the engine shares with the users of an Executor.
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "redag/base/time.hpp"
@@ -21,6 +22,24 @@ struct Mode {
 struct WatchLimits {
   Duration longest = 0;  // ns; 0: not given
   double deadlines = 0;  // multiple of the job's relative deadline; 0: not given
+};
+
+/// Processor time of the ended jobs of a task.
+struct Usage {
+  std::uint64_t jobs = 0;
+  Duration total = 0;
+  Duration longest = 0;
+  std::uint64_t over_wcet = 0;
+  std::uint64_t over_budget = 0;
+  std::uint64_t overdue = 0;  // jobs that the watchdog reported
+};
+
+/// How a deadline was missed.
+enum class MissKind : std::uint8_t {
+  Late,      // finished after its deadline
+  EndToEnd,  // a sink finished after the deadline of its DAG
+  Skipped,   // released and never started
+  Aborted,   // threw, or was cut off at its budget
 };
 
 }  // namespace redag::runtime

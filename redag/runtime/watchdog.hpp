@@ -11,6 +11,7 @@
 
 #include "redag/base/result.hpp"
 #include "redag/runtime/engine.hpp"
+#include "redag/runtime/executor_options.hpp"
 #include "redag/runtime/parker.hpp"
 #include "redag/runtime/threads.hpp"
 
