@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "redag/base/check.hpp"
-#include "redag/base/lock_guard.hpp"
 #include "redag/runtime/engine.hpp"
 #include "redag/runtime/event_state.hpp"
 
@@ -38,36 +37,4 @@ AsyncEvent::Awaiter AsyncEvent::in_coroutine() noexcept {
   return {{.wait = {.kind = runtime::detail::Wait::Kind::Event, .event = state_.get()}}, this};
 }
 
-namespace runtime::detail {
-
-bool EventState::add(Wait &wait) {
-  const LockGuard guard(lock);
-  if (std::exchange(is_set, false)) return false;
-  wait.next = first;
-  first = &wait;
-  return true;
-}
-
-bool EventState::remove(Wait &wait) {
-  const LockGuard guard(lock);
-  for (Wait **link = &first; *link != nullptr; link = &(*link)->next) {
-    if (*link != &wait) continue;
-    *link = wait.next;
-    return true;
-  }
-  return false;
-}
-
-Wait *EventState::set_or_take_all() {
-  const LockGuard guard(lock);
-  if (first == nullptr) is_set = true;
-  return std::exchange(first, nullptr);
-}
-
-bool EventState::reset() {
-  const LockGuard guard(lock);
-  return std::exchange(is_set, false);
-}
-
-}  // namespace runtime::detail
 }  // namespace redag
