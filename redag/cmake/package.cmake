@@ -28,9 +28,11 @@ function(redag_sources variable)
   set(${variable} ${sources} PARENT_SCOPE)
 endfunction()
 
-# redag_add_library(<target> <folder>...) adds the library of this project.
+# redag_add_library(<target> <folder>... [WITHOUT <source>...]) adds the library of this project.
 function(redag_add_library target)
-  redag_sources(sources ${ARGN})
+  cmake_parse_arguments(PARSE_ARGV 1 argument "" "" WITHOUT)
+  redag_sources(sources ${argument_UNPARSED_ARGUMENTS})
+  list(REMOVE_ITEM sources ${argument_WITHOUT} "")
   add_library(${target} ${sources})
   # Without DEFINE_SYMBOL, objects of shared and static libraries are the same, and ccache serves both.
   set_target_properties(${target} PROPERTIES DEFINE_SYMBOL ""

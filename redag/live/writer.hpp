@@ -12,11 +12,11 @@
 
 #include "redag/base/result.hpp"
 #include "redag/live/frame.hpp"
+#include "redag/live/owned_file.hpp"
 #include "redag/live/page.hpp"
 
 namespace redag::live {
 
-inline constexpr const char *kFolder = "/dev/shm";
 /// The largest frame that can be published: a thousand DAGs with five thousand tasks.
 inline constexpr std::size_t kSlotSize = std::size_t{4} << 20U;
 

@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "redag/base/check.hpp"
-#include "redag/runtime/engine.hpp"
-#include "redag/runtime/event_state.hpp"
+#include "redag/engine/engine.hpp"
+#include "redag/engine/event_state.hpp"
 
 namespace redag {
 

@@ -16,8 +16,8 @@
 #include "redag/base/time.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/runtime/stats.hpp"
-#include "redag/runtime/values.hpp"
 #include "redag/sched/config.hpp"
+#include "redag/threads/values.hpp"
 
 namespace redag::runtime {
 

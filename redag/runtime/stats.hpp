@@ -13,8 +13,8 @@
 
 #include "redag/base/time.hpp"
 #include "redag/model/job_event.hpp"
-#include "redag/runtime/values.hpp"
 #include "redag/sched/config.hpp"
+#include "redag/threads/values.hpp"
 
 namespace redag::runtime {
 

@@ -13,7 +13,7 @@
 #include <span>
 
 #include "redag/base/result.hpp"
-#include "redag/model/calibration.hpp"
+#include "redag/loader/calibration.hpp"
 #include "redag/model/job_event.hpp"
 #include "redag/model/workload.hpp"
 #include "redag_lab/run/stall_probe.hpp"

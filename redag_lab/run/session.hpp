@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
-#include "redag/model/calibration.hpp"
+#include "redag/loader/calibration.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/trace.hpp"

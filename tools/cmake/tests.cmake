@@ -5,10 +5,10 @@
 # <group>.<name>, with the group as label (`ctest -L '^sched$'`). Included by the repository's CMakeLists.txt.
 set(base redag/base)
 set(live redag/live)
-set(model redag/model)
+set(model redag/model redag/loader)
 set(sched redag/sched)
 set(trace redag/trace)
-set(runtime redag/runtime)
+set(runtime redag/threads redag/engine redag/runtime)
 set(executors redag_analysis/executors)
 set(metrics redag_analysis/metrics)
 set(sim redag_analysis/sim)

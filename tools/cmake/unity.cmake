@@ -40,12 +40,12 @@ set(alone
 # What each job passes is compiled alone in optimised builds: beside others GCC inlines less there, and a job costs the
 # scheduler 25 % more instructions, and the engine 11 % (tools/count_instructions).
 if(NOT CMAKE_BUILD_TYPE STREQUAL "Debug")
-  file(GLOB hot RELATIVE ${PROJECT_SOURCE_DIR} CONFIGURE_DEPENDS redag/sched/*.cpp redag/runtime/engine*.cpp
-    redag/runtime/job_placement.cpp redag/runtime/release_*.cpp redag/runtime/waiting_jobs.cpp redag_analysis/sim/*.cpp)
+  file(GLOB hot RELATIVE ${PROJECT_SOURCE_DIR} CONFIGURE_DEPENDS redag/sched/*.cpp redag/engine/engine*.cpp
+    redag/engine/job_placement.cpp redag/engine/release_*.cpp redag/threads/release_*.cpp redag/engine/waiting_jobs.cpp redag_analysis/sim/*.cpp)
   list(FILTER hot EXCLUDE REGEX "_test\\.cpp$")
   list(APPEND alone ${hot})
   # The rest gains nothing from -O3, and compiles in less time without it.
-  foreach(target IN ITEMS redag redag_analysis)
+  foreach(target IN ITEMS redag redag_core redag_analysis)
     target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O2>)
   endforeach()
   list(TRANSFORM hot PREPEND ${PROJECT_SOURCE_DIR}/)

@@ -23,7 +23,7 @@
 
 #include "callback.hpp"
 #include "hook.hpp"
-#include "redag/runtime/in_progress.hpp"
+#include "redag/engine/in_progress.hpp"
 #include "token_queue.hpp"
 
 namespace redag_rclcpp {

@@ -22,8 +22,8 @@
 #include "rclcpp/client.hpp"
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/pi_mutex.hpp"
+#include "redag/engine/running_job.hpp"
 #include "redag/runtime/async_event.hpp"
-#include "redag/runtime/running_job.hpp"
 
 namespace redag_rclcpp {
 

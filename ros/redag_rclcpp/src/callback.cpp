@@ -6,8 +6,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "redag/runtime/running_job.hpp"
-#include "redag/runtime/waiting_jobs.hpp"
+#include "redag/engine/running_job.hpp"
+#include "redag/engine/waiting_jobs.hpp"
 
 namespace redag_rclcpp {
 

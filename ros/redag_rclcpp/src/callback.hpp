@@ -20,9 +20,9 @@
 #include "redag/base/histogram.hpp"
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/pi_mutex.hpp"
+#include "redag/engine/coroutine_body.hpp"
+#include "redag/engine/engine.hpp"
 #include "redag/model/callback_match.hpp"
-#include "redag/runtime/coroutine_body.hpp"
-#include "redag/runtime/engine.hpp"
 #include "timer_queue.hpp"
 #include "wait_set_member.hpp"
 

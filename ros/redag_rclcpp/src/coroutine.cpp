@@ -9,8 +9,8 @@
 #include "awaited_calls.hpp"
 #include "callback.hpp"
 #include "rclcpp/logging.hpp"
-#include "redag/runtime/coroutine_body.hpp"
-#include "redag/runtime/running_job.hpp"
+#include "redag/engine/coroutine_body.hpp"
+#include "redag/engine/running_job.hpp"
 
 namespace redag_rclcpp::detail {
 

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "redag/runtime/engine.hpp"
+#include "redag/engine/engine.hpp"
 #include "redag_rclcpp/executor.hpp"
 #include "thread_wait.hpp"
 

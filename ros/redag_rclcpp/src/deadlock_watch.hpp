@@ -13,7 +13,7 @@
 
 #include "deadlock_detector.hpp"
 #include "notes.hpp"
-#include "redag/runtime/engine.hpp"
+#include "redag/engine/engine.hpp"
 #include "task_table.hpp"
 
 namespace redag_rclcpp {

@@ -7,8 +7,8 @@
 #include <memory>
 #include <string>
 
+#include "redag/engine/engine.hpp"
 #include "redag/runtime/device_handle.hpp"
-#include "redag/runtime/engine.hpp"
 #include "timer_queue.hpp"
 
 namespace redag_rclcpp {

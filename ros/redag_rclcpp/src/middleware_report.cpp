@@ -10,7 +10,7 @@
 #include <iterator>
 #include <map>
 
-#include "redag/runtime/threads.hpp"
+#include "redag/threads/threads.hpp"
 
 namespace redag_rclcpp {
 namespace {

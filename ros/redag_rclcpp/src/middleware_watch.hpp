@@ -11,7 +11,7 @@
 #include "notes.hpp"
 #include "rclcpp/context.hpp"
 #include "redag/base/time.hpp"
-#include "redag/runtime/setup.hpp"
+#include "redag/threads/setup.hpp"
 
 namespace redag_rclcpp {
 

@@ -27,7 +27,7 @@
 #include "rclcpp_action/rclcpp_action.hpp"
 #include "redag/live/reader.hpp"
 #include "redag/live/writer.hpp"
-#include "redag/runtime/parker.hpp"
+#include "redag/threads/parker.hpp"
 #include "redag_rclcpp/monitor.hpp"
 #include "spinning.hpp"
 #include "test_msgs/action/fibonacci.hpp"

@@ -23,8 +23,8 @@
 #include "middleware_threads.hpp"
 #include "mode_test.hpp"
 #include "rcl/context.h"
-#include "redag/runtime/parker.hpp"
-#include "redag/runtime/threads.hpp"
+#include "redag/threads/parker.hpp"
+#include "redag/threads/threads.hpp"
 #include "spinning.hpp"
 #include "start_routines.hpp"
 

@@ -10,8 +10,8 @@
 #include <random>
 
 #include "hook.hpp"
-#include "redag/runtime/clock.hpp"
 #include "redag/sched/priority_scheduler.hpp"
+#include "redag/threads/clock.hpp"
 #include "release_timer.hpp"
 #include "timer_queue.hpp"
 #include "token_queue.hpp"

@@ -17,7 +17,7 @@
 #include <string>
 
 #include "rclcpp/node.hpp"
-#include "redag/model/calibration.hpp"
+#include "redag/loader/calibration.hpp"
 #include "redag/model/workload.hpp"
 #include "redag_rclcpp/executor.hpp"
 

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "redag/model/calibration.hpp"
+#include "redag/loader/calibration.hpp"
 #include "redag/model/job_event.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/sched/scheduler.hpp"

@@ -1,0 +1,206 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+#include "redag/loader/calibration.hpp"
+
+#include <fmt/format.h>
+
+#include "redag/loader/text_file.hpp"
+#include "redag/loader/workload_yaml_values.hpp"
+#include "redag/loader/yaml_writer.hpp"
+
+namespace redag {
+namespace {
+
+using yaml::find;
+using yaml::Node;
+using yaml::Writer;
+
+constexpr std::size_t kMaxBytes = std::size_t{1} << 20U;
+
+class OverheadsReader : private yaml::ValueReader {
+ public:
+  OverheadsReader(const Node &root, std::string file) : ValueReader(std::move(file)), root_(root) {}
+
+  Result<Calibration> run() {
+    // `measured` is for people and is not read.
+    if (check_map(root_, "an overheads file", {"overheads", "provenance", "measured"})) {
+      read_overheads();
+      read_provenance();
+    }
+    Diagnostics mistakes = take_diagnostics();
+    if (!mistakes.empty()) return tl::unexpected<Diagnostics>(std::move(mistakes));
+    return std::move(calibration_);
+  }
+
+ private:
+  void read_overheads() {
+    const Node *node = find(root_, "overheads");
+    if (node == nullptr) {
+      error(root_, "the key 'overheads' is missing", "'redag calibrate --out FILE' writes an overheads file");
+      return;
+    }
+    if (!check_map(*node, "overheads", {"realtime", "normal"})) return;
+    if (const Node *one = find(*node, "realtime")) calibration_.realtime = read_class(*one, "realtime");
+    if (const Node *one = find(*node, "normal")) calibration_.normal = read_class(*one, "normal");
+    if (find(*node, "realtime") == nullptr && find(*node, "normal") == nullptr) {
+      error(*node, "overheads must have 'realtime', 'normal', or both");
+    }
+  }
+
+  Overheads read_class(const Node &node, std::string_view what) {
+    Overheads overheads;
+    if (!check_map(node, what, overhead_names())) return overheads;
+    for (const std::string_view name : overhead_names()) {
+      const Node *value = find(node, name);
+      if (value == nullptr) {
+        error(node, fmt::format("{} has no '{}'", what, name),
+              "write 0 for an overhead that the machine does not have");
+        continue;
+      }
+      *overhead_named(overheads, name) = duration_from_zero(*value, name).value_or(0);
+    }
+    for (const std::string_view name : {"stall_per_second", "noise_per_second"}) {
+      if (*overhead_named(overheads, name) >= kSecond)
+        error(node, fmt::format("{} must be below one second per second", name));
+    }
+    return overheads;
+  }
+
+  void read_provenance() {
+    const Node *node = find(root_, "provenance");
+    if (node == nullptr) return;
+    if (!check_map(*node, "provenance",
+                   {"date", "host", "kernel", "processor", "processors", "rights", "load", "duration", "complete",
+                    "version"})) {
+      return;
+    }
+    const auto take_text = [&](const char *key, std::string &out) {
+      const Node *value = find(*node, key);
+      if (value == nullptr) return;
+      if (const std::optional<std::string> read = text(*value, key)) out = *read;
+    };
+    take_text("date", calibration_.date);
+    take_text("host", calibration_.host);
+    take_text("kernel", calibration_.kernel);
+    take_text("processor", calibration_.processor);
+    take_text("rights", calibration_.rights);
+    take_text("load", calibration_.load);
+    take_text("version", calibration_.version);
+    if (const Node *value = find(*node, "processors")) {
+      if (const auto read = integer<std::uint32_t>(*value, "processors", 0)) calibration_.processors = *read;
+    }
+    if (const Node *value = find(*node, "duration")) {
+      if (const auto read = duration(*value, "duration")) calibration_.duration = *read;
+    }
+    if (const Node *value = find(*node, "complete")) {
+      if (value->text == "true" || value->text == "false") {
+        calibration_.complete = value->text == "true";
+      } else {
+        wrong_type(*value, "complete", "true or false");
+      }
+    }
+  }
+
+  const Node &root_;
+  Calibration calibration_;
+};
+
+void write_quoted(Writer &out, std::string_view key, std::string_view value) {
+  out.text(key);
+  out.quoted(value);
+}
+
+void write(Writer &out, std::string_view key, const std::optional<Overheads> &overheads) {
+  if (!overheads) return;
+  Overheads copy = *overheads;
+  out.text(key);
+  out.begin_map();
+  for (const std::string_view name : overhead_names()) {
+    out.write(name, format_duration(*overhead_named(copy, name)));
+  }
+  out.end_map();
+}
+
+void write(Writer &out, const Measured &row) {
+  out.begin_map(Writer::Layout::OneLine);
+  out.write("what", row.what);
+  out.write("threads", row.threads);
+  out.write("load", row.load);
+  out.write("samples", row.samples);
+  out.write("p50", format_duration(row.p50));
+  out.write("p99", format_duration(row.p99));
+  out.write("p999", format_duration(row.p999));
+  out.write("max", format_duration(row.max));
+  out.end_map();
+}
+
+}  // namespace
+
+std::string Calibration::provenance() const {
+  std::string text = fmt::format("calibrated {} on {}", date.empty() ? "on an unknown day" : date,
+                                 host.empty() ? "an unknown host" : host);
+  if (!load.empty()) text += ", " + load;
+  if (duration > 0) text += ", " + humanize_duration(duration);
+  return text + (complete ? "" : ", partial: ended early");
+}
+
+Result<Overheads> Calibration::of(bool realtime_threads) const {
+  const std::optional<Overheads> &found = realtime_threads ? realtime : normal;
+  if (found) return *found;
+  return realtime_threads
+             ? make_error("the calibration has no overheads of SCHED_FIFO threads",
+                          "run 'redag calibrate' in a process that may use SCHED_FIFO, or use --preemption cooperative "
+                          "or none")
+             : make_error("the calibration has no overheads of ordinary threads", "run 'redag calibrate' again");
+}
+
+std::string to_yaml(const Calibration &calibration) {
+  Writer out;
+  out.begin_map();
+  out.text("overheads");
+  out.begin_map();
+  write(out, "realtime", calibration.realtime);
+  write(out, "normal", calibration.normal);
+  out.end_map();
+  out.text("provenance");
+  out.begin_map();
+  write_quoted(out, "date", calibration.date);
+  write_quoted(out, "host", calibration.host);
+  write_quoted(out, "kernel", calibration.kernel);
+  write_quoted(out, "processor", calibration.processor);
+  out.write("processors", calibration.processors);
+  write_quoted(out, "rights", calibration.rights);
+  write_quoted(out, "load", calibration.load);
+  out.write("duration", format_duration(calibration.duration));
+  out.write("complete", calibration.complete ? "true" : "false");
+  write_quoted(out, "version", calibration.version);
+  out.end_map();
+  if (!calibration.measured.empty()) {
+    out.text("measured");
+    out.begin_list();
+    for (const Measured &row : calibration.measured) write(out, row);
+    out.end_list();
+  }
+  out.end_map();
+  return "# What this machine adds to the jobs of a workload: docs/calibration.md. Charged with --overheads FILE.\n" +
+         out.take();
+}
+
+Result<Calibration> parse_calibration(std::string_view text, std::string file_name) {
+  if (text.size() > kMaxBytes) {
+    return tl::unexpected<Diagnostics>(
+        Diagnostics{Diagnostic{Severity::Error, file_name, 0, 0, "too large for an overheads file", {}}});
+  }
+  const Result<Node> root = yaml::parse(text, file_name);
+  if (!root) return tl::unexpected<Diagnostics>(root.error());
+  return OverheadsReader(*root, std::move(file_name)).run();
+}
+
+Result<Calibration> load_calibration(const std::filesystem::path &path) {
+  const Result<std::string> text = read_text_file(path, "an overheads file", kMaxBytes);
+  if (!text) return tl::unexpected<Diagnostics>(text.error());
+  return parse_calibration(*text, path.string());
+}
+
+}  // namespace redag
