@@ -17,12 +17,9 @@
 #include <thread>
 #include <vector>
 
-#include "bridge.hpp"
-#include "callback.hpp"
-#include "deadlock_watch.hpp"
+#include "entities/bridge.hpp"
+#include "entities/callback.hpp"
 #include "learning.hpp"
-#include "middleware_watch.hpp"
-#include "notes.hpp"
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/pi_mutex.hpp"
 #include "redag/live/publisher.hpp"
@@ -33,6 +30,9 @@
 #include "registry.hpp"
 #include "release_timer.hpp"
 #include "task_table.hpp"
+#include "watch/deadlock_watch.hpp"
+#include "watch/middleware_watch.hpp"
+#include "watch/notes.hpp"
 
 namespace redag_rclcpp {
 

@@ -12,8 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "callback.hpp"
-#include "deadlock_detector.hpp"
+#include "entities/callback.hpp"
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/pi_mutex.hpp"
 #include "redag/engine/engine.hpp"
@@ -22,6 +21,7 @@
 #include "redag/model/workload.hpp"
 #include "redag/trace/trace.hpp"
 #include "redag_rclcpp/executor.hpp"
+#include "watch/deadlock_detector.hpp"
 
 namespace redag_rclcpp {
 

@@ -32,7 +32,7 @@
 #include "spinning.hpp"
 #include "test_msgs/action/fibonacci.hpp"
 #include "test_msgs/srv/empty.hpp"
-#include "thread_wait.hpp"
+#include "watch/thread_wait.hpp"
 
 namespace redag_rclcpp {
 namespace {
