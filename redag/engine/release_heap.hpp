@@ -21,7 +21,8 @@ class ReleaseHeap {
   /// `seed` is that of the release jitter.
   explicit ReleaseHeap(std::uint64_t seed) : seed_(seed) {}
 
-  /// Job k of a timer task is released at base + offset + k * period. Data tasks are ignored.
+  /// Job k of a timer task is released at base + offset + k * period, whenever a thread sees it: a late timer must not
+  /// make responses look shorter. Data tasks are ignored.
   void add(const Task &task, TaskId id, Time base);
   /// Ends the releases of these tasks.
   void remove(std::span<const TaskId> tasks);

@@ -387,7 +387,9 @@ class Reader : private yaml::ValueReader {
     }
   }
 
-  /// True if predecessors release the task's jobs, because it has some and states nothing that only timers have.
+  /// True if predecessors release the task's jobs, because it has some and states nothing that only timers have. Most
+  /// people who write `after: x` mean that `x` releases the task. The period of the DAG is a default of its timer tasks
+  /// and does not say which these are. Descriptions of recorded runs keep the former rule (`timers_by_default`).
   bool is_data_by_default(const Task &task, const TaskPart &part) const {
     if (options_.timers_by_default || part.node->kind != Node::Kind::Map) return false;
     const Node *after = find(part, Field::After);

@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Response times of DAGs and tasks that wait without a worker, for devices or otherwise, on any number of workers. Both
-// need R <= T. Proofs: docs/analysis.md, "Waits on any number of workers".
+// need R <= T. Proofs: docs/analysis.md, "Waits on any number of workers". Workers and devices are alike: resources of
+// several servers, for which a critical path waits while all are busy. No proof covers groups, cooperative preemption
+// points, shared levels, edges between rates or HI mode beside waits, so such workloads get no bound.
 #pragma once
 
 #include "redag_analysis/core/bound.hpp"
