@@ -143,7 +143,7 @@ REASONS = ["none", "overrun", "precedence", "queue_full", "dag_full", "removed",
 
 
 def decoded(code, base):
-    """Decodes a block of events as docs/results_format.md describes it, and nothing but the description."""
+    """Decodes a block of events by the description in redag/trace/event_codec.hpp alone."""
     place = 0
 
     def number():
