@@ -35,7 +35,7 @@ struct WhyOverview {
 [[nodiscard]] std::string describe(const WhyOverview &overview, const trace::RunInfo &run,
                                    const StreamTraits &terminal);
 
-/// Returns the document "redag.why/1" (docs/results_format.md).
+/// Returns the document "redag.why/1" (docs/why.md).
 [[nodiscard]] Json to_json(const WhyOverview &overview, const trace::RunInfo &run);
 
 }  // namespace redag::cli
