@@ -20,7 +20,8 @@ namespace redag::robot {
 // executor, as they do in the union. On one processor, though, the bounds for one worker count a less urgent job with a
 // group once. Each of several executors starts jobs that the processor does not run yet. Such a job takes its group, is
 // run when a more urgent one waits for the group, and this can happen again for each of these. The bounds for several
-// workers count that, and with groups apply to one processor as well.
+// workers count that, and with groups apply to one processor as well. A job that has just started can be preempted
+// before its first instruction: each less urgent job may delay by 1 ns more than the bounds count.
 
 /// DAGs and groups have the name of their process before them: "base/control". Threads that can delay tasks are DAGs
 /// "threads/NAME". If the order is not the policy's alone, the union's policy is `fixed`. Errors: what analysis cannot
