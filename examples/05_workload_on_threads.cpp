@@ -7,7 +7,7 @@
 //     example_05_workload_on_threads [WORKLOAD.yaml]
 #include <fmt/format.h>
 
-#include "redag/model/workload_yaml.hpp"
+#include "redag/loader/workload_yaml.hpp"
 #include "redag_lab/run/run_workload.hpp"
 
 using namespace redag;

@@ -4,7 +4,7 @@
 // Checks the statements that workloads/contention.yaml makes about itself.
 #include <gtest/gtest.h>
 
-#include "redag/model/workload_yaml.hpp"
+#include "redag/loader/workload_yaml.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_analysis/metrics/summary.hpp"
 #include "redag_analysis/sim/simulator.hpp"

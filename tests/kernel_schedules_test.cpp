@@ -25,11 +25,11 @@
 #include <gtest/gtest.h>
 
 #include "redag/base/rng.hpp"
-#include "redag/model/validate.hpp"
-#include "redag/runtime/clock.hpp"
-#include "redag/runtime/preemption_point.hpp"
-#include "redag/runtime/threads.hpp"
+#include "redag/engine/preemption_point.hpp"
+#include "redag/loader/validate.hpp"
 #include "redag/sched/priority_scheduler.hpp"
+#include "redag/threads/clock.hpp"
+#include "redag/threads/threads.hpp"
 #include "redag_lab/run/concurrency.hpp"
 #include "redag_lab/run/run_workload.hpp"
 #include "redag_lab/run/synthetic.hpp"

@@ -16,10 +16,10 @@
 
 #include "redag/base/futex.hpp"
 #include "redag/base/rng.hpp"
-#include "redag/runtime/clock.hpp"
-#include "redag/runtime/engine.hpp"
-#include "redag/runtime/setup.hpp"
+#include "redag/engine/engine.hpp"
 #include "redag/sched/priority_scheduler.hpp"
+#include "redag/threads/clock.hpp"
+#include "redag/threads/setup.hpp"
 
 namespace redag::benchmarks {
 

@@ -12,11 +12,11 @@
 #include <thread>
 #include <vector>
 
-#include "redag/runtime/clock.hpp"
-#include "redag/runtime/engine.hpp"
+#include "redag/engine/engine.hpp"
 #include "redag/runtime/executor.hpp"
-#include "redag/runtime/parker.hpp"
 #include "redag/sched/priority_scheduler.hpp"
+#include "redag/threads/clock.hpp"
+#include "redag/threads/parker.hpp"
 
 namespace {
 

@@ -13,11 +13,11 @@
 #include <thread>
 #include <vector>
 
-#include "redag/runtime/clock.hpp"
-#include "redag/runtime/engine.hpp"
-#include "redag/runtime/release_timer.hpp"
-#include "redag/runtime/threads.hpp"
+#include "redag/engine/engine.hpp"
+#include "redag/engine/release_timer.hpp"
 #include "redag/sched/priority_scheduler.hpp"
+#include "redag/threads/clock.hpp"
+#include "redag/threads/threads.hpp"
 
 namespace {
 

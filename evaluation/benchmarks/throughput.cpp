@@ -17,10 +17,10 @@
 #include <thread>
 #include <vector>
 
-#include "redag/runtime/clock.hpp"
-#include "redag/runtime/engine.hpp"
-#include "redag/runtime/threads.hpp"
+#include "redag/engine/engine.hpp"
 #include "redag/sched/priority_scheduler.hpp"
+#include "redag/threads/clock.hpp"
+#include "redag/threads/threads.hpp"
 
 namespace {
 

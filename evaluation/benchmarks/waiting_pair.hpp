@@ -12,12 +12,12 @@
 #include <vector>
 
 #include "redag/base/futex.hpp"
+#include "redag/engine/coroutine_body.hpp"
+#include "redag/engine/engine.hpp"
 #include "redag/runtime/async_event.hpp"
-#include "redag/runtime/clock.hpp"
-#include "redag/runtime/coroutine_body.hpp"
-#include "redag/runtime/engine.hpp"
-#include "redag/runtime/setup.hpp"
 #include "redag/sched/priority_scheduler.hpp"
+#include "redag/threads/clock.hpp"
+#include "redag/threads/setup.hpp"
 
 namespace redag::benchmarks {
 

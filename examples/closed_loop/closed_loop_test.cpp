@@ -16,7 +16,7 @@
 #include "experiment.hpp"
 #include "lqr.hpp"
 #include "pictures.hpp"
-#include "redag/model/workload_yaml.hpp"
+#include "redag/loader/workload_yaml.hpp"
 
 namespace closed_loop {
 namespace {

@@ -24,7 +24,7 @@
 #include "experiment.hpp"
 #include "pictures.hpp"
 #include "redag/base/text.hpp"
-#include "redag/model/workload_yaml.hpp"
+#include "redag/loader/workload_yaml.hpp"
 
 using namespace closed_loop;
 using redag::kMillisecond;

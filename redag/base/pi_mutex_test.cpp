@@ -18,8 +18,8 @@
 
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/mutex.hpp"
-#include "redag/runtime/parker.hpp"
-#include "redag/runtime/threads.hpp"
+#include "redag/threads/parker.hpp"
+#include "redag/threads/threads.hpp"
 
 namespace redag {
 namespace {

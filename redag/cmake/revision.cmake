@@ -25,7 +25,7 @@ if(NOT REVISION MATCHES "^[A-Za-z0-9._+~-]+$")
 endif()
 
 file(WRITE ${OUTPUT}.new "// Made by redag/cmake/revision.cmake.
-#include \"redag/base/provenance.hpp\"
+#include \"redag/loader/provenance.hpp\"
 
 const char *redag::build_revision() { return \"${REVISION}\"; }
 ")

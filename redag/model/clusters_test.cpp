@@ -12,8 +12,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "redag/model/validate.hpp"
-#include "redag/model/workload_yaml.hpp"
+#include "redag/loader/validate.hpp"
+#include "redag/loader/workload_yaml.hpp"
 #include "tests/testing/builders.hpp"
 
 namespace redag {

@@ -4,10 +4,10 @@
 // The text form of a calibration: docs/calibration.md.
 #include <fmt/format.h>
 
+#include "redag/loader/text_file.hpp"
+#include "redag/loader/workload_yaml_values.hpp"
+#include "redag/loader/yaml_writer.hpp"
 #include "redag/model/overheads.hpp"
-#include "redag/model/text_file.hpp"
-#include "redag/model/workload_yaml_values.hpp"
-#include "redag/model/yaml_writer.hpp"
 
 namespace redag {
 namespace {

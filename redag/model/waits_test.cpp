@@ -12,8 +12,8 @@
 #include <gtest/gtest.h>
 
 #include "redag/base/rng.hpp"
+#include "redag/loader/workload_yaml.hpp"
 #include "redag/model/demand.hpp"
-#include "redag/model/workload_yaml.hpp"
 
 namespace redag {
 namespace {

@@ -7,8 +7,8 @@
 
 #include "redag/base/check.hpp"
 #include "redag/base/lock_guard.hpp"
-#include "redag/runtime/engine.hpp"
-#include "redag/runtime/event_state.hpp"
+#include "redag/engine/engine.hpp"
+#include "redag/engine/event_state.hpp"
 
 namespace redag {
 

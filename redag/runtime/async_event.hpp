@@ -9,7 +9,7 @@
 #include <memory>
 #include <span>
 
-#include "redag/runtime/coroutine.hpp"
+#include "redag/engine/coroutine.hpp"
 
 namespace redag {
 

@@ -3,7 +3,7 @@
 
 #include "redag/runtime/blocking.hpp"
 
-#include "redag/runtime/running_job.hpp"
+#include "redag/engine/running_job.hpp"
 
 namespace redag {
 

@@ -15,9 +15,9 @@
 #include <thread>
 #include <vector>
 
+#include "redag/engine/preemption_point.hpp"
 #include "redag/runtime/async_event.hpp"
 #include "redag/runtime/executor.hpp"
-#include "redag/runtime/preemption_point.hpp"
 #include "tests/testing/allocation_counter.hpp"
 #include "tests/testing/every_mode.hpp"
 #include "tests/testing/one_worker.hpp"

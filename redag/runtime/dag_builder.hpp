@@ -15,8 +15,8 @@
 #include <utility>
 #include <vector>
 
+#include "redag/engine/coroutine.hpp"
 #include "redag/model/workload.hpp"
-#include "redag/runtime/coroutine.hpp"
 
 namespace redag::runtime {
 

@@ -8,7 +8,7 @@
 #include <set>
 #include <string>
 
-#include "redag/model/workload_yaml.hpp"
+#include "redag/loader/workload_yaml.hpp"
 #include "redag/runtime/executor.hpp"
 #include "redag/trace/output_file.hpp"
 #include "tests/testing/one_worker.hpp"

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "redag/base/text.hpp"
-#include "redag/model/validate.hpp"
+#include "redag/loader/validate.hpp"
 
 namespace redag::runtime {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <stdexcept>
 
-#include "redag/runtime/running_job.hpp"
+#include "redag/engine/running_job.hpp"
 
 namespace redag::runtime {
 

@@ -9,7 +9,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "redag/runtime/coroutine.hpp"
+#include "redag/engine/coroutine.hpp"
 
 namespace redag::runtime {
 

@@ -16,8 +16,8 @@
 #include <thread>
 #include <vector>
 
+#include "redag/engine/coroutine.hpp"
 #include "redag/runtime/async_event.hpp"
-#include "redag/runtime/coroutine.hpp"
 #include "redag/runtime/executor.hpp"
 #include "tests/testing/every_mode.hpp"
 #include "tests/testing/one_worker.hpp"

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "redag/runtime/executor.hpp"
-#include "redag/runtime/parker.hpp"
+#include "redag/threads/parker.hpp"
 #include "tests/testing/one_worker.hpp"
 
 namespace redag::runtime {

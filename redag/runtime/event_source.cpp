@@ -7,7 +7,7 @@
 
 #include "redag/base/check.hpp"
 #include "redag/base/lock_guard.hpp"
-#include "redag/runtime/engine.hpp"
+#include "redag/engine/engine.hpp"
 
 namespace redag::runtime {
 

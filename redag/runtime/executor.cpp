@@ -10,13 +10,13 @@
 #include <stdexcept>
 #include <utility>
 
-#include "redag/runtime/clock.hpp"
 #include "redag/runtime/executor_impl.hpp"
 #include "redag/runtime/live_sample.hpp"
-#include "redag/runtime/spins.hpp"
 #include "redag/runtime/stop_signals.hpp"
-#include "redag/runtime/threads.hpp"
 #include "redag/sched/priority_scheduler.hpp"
+#include "redag/threads/clock.hpp"
+#include "redag/threads/spins.hpp"
+#include "redag/threads/threads.hpp"
 
 namespace redag::runtime {
 namespace {

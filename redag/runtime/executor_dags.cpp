@@ -9,8 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "redag/model/validate.hpp"
-#include "redag/runtime/coroutine_body.hpp"
+#include "redag/engine/coroutine_body.hpp"
+#include "redag/loader/validate.hpp"
 #include "redag/runtime/dag_mistakes.hpp"
 #include "redag/runtime/distribution_content.hpp"
 #include "redag/runtime/executor_impl.hpp"

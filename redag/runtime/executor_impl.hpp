@@ -17,15 +17,15 @@
 #include "redag/base/mutex.hpp"
 #include "redag/base/pi_mutex.hpp"
 #include "redag/base/thread_annotations.hpp"
+#include "redag/engine/engine.hpp"
+#include "redag/engine/release_timer.hpp"
 #include "redag/live/publisher.hpp"
-#include "redag/runtime/engine.hpp"
 #include "redag/runtime/event_source.hpp"
 #include "redag/runtime/executor.hpp"
 #include "redag/runtime/miss_reporter.hpp"
 #include "redag/runtime/recorder.hpp"
-#include "redag/runtime/release_timer.hpp"
-#include "redag/runtime/setup.hpp"
 #include "redag/runtime/watchdog.hpp"
+#include "redag/threads/setup.hpp"
 #include "redag/trace/trace.hpp"
 
 namespace redag::runtime {

@@ -9,7 +9,7 @@
 #include <type_traits>
 
 #include "redag/base/text.hpp"
-#include "redag/model/validate.hpp"
+#include "redag/loader/validate.hpp"
 #include "redag/runtime/executor_impl.hpp"
 
 namespace redag::runtime {

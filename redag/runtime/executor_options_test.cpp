@@ -8,7 +8,7 @@
 #include <functional>
 #include <limits>
 
-#include "redag/model/validate.hpp"
+#include "redag/loader/validate.hpp"
 #include "redag/runtime/executor.hpp"
 
 namespace redag::runtime {

@@ -12,9 +12,9 @@
 #include <thread>
 #include <vector>
 
+#include "redag/engine/preemption_point.hpp"
 #include "redag/runtime/executor.hpp"
-#include "redag/runtime/parker.hpp"
-#include "redag/runtime/preemption_point.hpp"
+#include "redag/threads/parker.hpp"
 #include "tests/testing/one_worker.hpp"
 
 namespace redag::runtime {

@@ -14,8 +14,8 @@
 #include <thread>
 #include <vector>
 
-#include "redag/runtime/parker.hpp"
-#include "redag/runtime/preemption_point.hpp"
+#include "redag/engine/preemption_point.hpp"
+#include "redag/threads/parker.hpp"
 #include "tests/testing/one_worker.hpp"
 
 namespace redag::runtime {

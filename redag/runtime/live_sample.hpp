@@ -6,10 +6,10 @@
 
 #include <span>
 
+#include "redag/engine/engine.hpp"
 #include "redag/live/publisher.hpp"
 #include "redag/model/workload.hpp"
-#include "redag/runtime/engine.hpp"
-#include "redag/runtime/setup.hpp"
+#include "redag/threads/setup.hpp"
 
 namespace redag::runtime {
 

@@ -9,8 +9,8 @@
 
 #include "redag/base/atomic.hpp"
 #include "redag/base/result.hpp"
-#include "redag/runtime/miss_log.hpp"
-#include "redag/runtime/threads.hpp"
+#include "redag/engine/miss_log.hpp"
+#include "redag/threads/threads.hpp"
 
 namespace redag::runtime {
 

@@ -21,13 +21,13 @@
 #include <vector>
 
 #include "redag/base/rng.hpp"
+#include "redag/engine/engine.hpp"
 #include "redag/live/order_page.hpp"
 #include "redag/live/process.hpp"
-#include "redag/runtime/clock.hpp"
-#include "redag/runtime/engine.hpp"
-#include "redag/runtime/parker.hpp"
-#include "redag/runtime/threads.hpp"
 #include "redag/sched/priority_scheduler.hpp"
+#include "redag/threads/clock.hpp"
+#include "redag/threads/parker.hpp"
+#include "redag/threads/threads.hpp"
 #include "tests/testing/builders.hpp"
 
 namespace redag::runtime {

@@ -14,8 +14,8 @@
 #include <system_error>
 #include <utility>
 
-#include "redag/base/provenance.hpp"
-#include "redag/runtime/clock.hpp"
+#include "redag/loader/provenance.hpp"
+#include "redag/threads/clock.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/output_file.hpp"
 

@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
-#include "redag/runtime/engine.hpp"
-#include "redag/runtime/parker.hpp"
-#include "redag/runtime/threads.hpp"
+#include "redag/engine/engine.hpp"
+#include "redag/threads/parker.hpp"
+#include "redag/threads/threads.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/trace.hpp"
 

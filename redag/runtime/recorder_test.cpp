@@ -17,8 +17,8 @@
 #include <thread>
 #include <vector>
 
-#include "redag/runtime/clock.hpp"
 #include "redag/runtime/executor.hpp"
+#include "redag/threads/clock.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag_analysis/metrics/summary.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"

@@ -11,7 +11,7 @@
 #include <ctime>
 #include <stdexcept>
 
-#include "redag/runtime/clock.hpp"
+#include "redag/threads/clock.hpp"
 
 namespace redag::runtime {
 namespace {

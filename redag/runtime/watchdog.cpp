@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "redag/runtime/clock.hpp"
+#include "redag/threads/clock.hpp"
 
 namespace redag::runtime {
 namespace {

@@ -14,10 +14,10 @@
 #include <thread>
 #include <vector>
 
-#include "redag/runtime/clock.hpp"
+#include "redag/engine/preemption_point.hpp"
 #include "redag/runtime/executor.hpp"
-#include "redag/runtime/preemption_point.hpp"
 #include "redag/sched/priority_scheduler.hpp"
+#include "redag/threads/clock.hpp"
 #include "tests/testing/builders.hpp"
 
 namespace redag::runtime {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "redag/model/validate.hpp"
+#include "redag/loader/validate.hpp"
 #include "redag/trace/trace.hpp"
 
 namespace redag::trace {

@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "redag/base/rng.hpp"
-#include "redag/model/validate.hpp"
+#include "redag/loader/validate.hpp"
 #include "redag/trace/trace.hpp"
 
 namespace redag::trace {

@@ -22,7 +22,7 @@
 
 #include "redag/base/check.hpp"
 #include "redag/base/text.hpp"
-#include "redag/model/validate.hpp"
+#include "redag/loader/validate.hpp"
 #include "redag/trace/event_codec.hpp"
 #include "redag/trace/input_file.hpp"
 #include "redag/trace/output_file.hpp"

@@ -10,7 +10,7 @@
 #include <filesystem>
 
 #include "redag/base/rng.hpp"
-#include "redag/model/workload_yaml.hpp"
+#include "redag/loader/workload_yaml.hpp"
 #include "redag/trace/output_file.hpp"
 #include "redag/trace/run_info_json.hpp"
 #include "tests/testing/builders.hpp"

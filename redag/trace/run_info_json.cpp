@@ -11,8 +11,8 @@
 #include <utility>
 
 #include "redag/base/text.hpp"
-#include "redag/model/validate.hpp"
-#include "redag/model/workload_yaml.hpp"
+#include "redag/loader/validate.hpp"
+#include "redag/loader/workload_yaml.hpp"
 #include "redag/trace/output_file.hpp"
 
 namespace redag::trace {

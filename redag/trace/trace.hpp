@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "redag/base/provenance.hpp"
 #include "redag/base/time.hpp"
+#include "redag/loader/provenance.hpp"
 #include "redag/model/job_event.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/sched/scheduler.hpp"

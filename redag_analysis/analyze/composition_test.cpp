@@ -8,7 +8,7 @@
 #include <map>
 #include <string>
 
-#include "redag/model/workload_yaml.hpp"
+#include "redag/loader/workload_yaml.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
 #include "tests/testing/bound_property.hpp"
 #include "tests/testing/random_workloads.hpp"

@@ -9,7 +9,7 @@
 #include <array>
 #include <cmath>
 
-#include "redag/model/validate.hpp"
+#include "redag/loader/validate.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
 #include "redag_analysis/analyze/chains.hpp"
 #include "redag_analysis/analyze/executors.hpp"

@@ -10,7 +10,7 @@
 #include <string>
 #include <string_view>
 
-#include "redag/model/workload_yaml.hpp"
+#include "redag/loader/workload_yaml.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
 #include "redag_analysis/many_workers/global_dag.hpp"
 #include "redag_analysis/many_workers/global_groups.hpp"

@@ -9,8 +9,8 @@
 #include <set>
 #include <utility>
 
+#include "redag/loader/validate.hpp"
 #include "redag/model/modes.hpp"
-#include "redag/model/validate.hpp"
 #include "redag/sched/policy.hpp"
 #include "redag_analysis/core/arithmetic.hpp"
 #include "redag_analysis/core/jobs_in_progress.hpp"

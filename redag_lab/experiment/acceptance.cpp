@@ -11,7 +11,7 @@
 
 #include "redag/base/check.hpp"
 #include "redag/base/rng.hpp"
-#include "redag/model/workload_yaml.hpp"
+#include "redag/loader/workload_yaml.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
 #include "redag_analysis/metrics/deadline_watch.hpp"

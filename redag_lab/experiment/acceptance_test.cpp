@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <set>
 
-#include "redag/model/workload_yaml.hpp"
+#include "redag/loader/workload_yaml.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
 
 namespace redag::experiment {

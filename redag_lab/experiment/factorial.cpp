@@ -12,7 +12,7 @@
 #include <fmt/format.h>
 
 #include "redag/base/text.hpp"
-#include "redag/model/validate.hpp"
+#include "redag/loader/validate.hpp"
 
 namespace redag::experiment {
 namespace {

@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
+#include "redag/loader/workload_yaml_tree.hpp"
 #include "redag/model/workload.hpp"
-#include "redag/model/workload_yaml_tree.hpp"
 #include "redag_analysis/sim/simulator.hpp"
 #include "redag_lab/experiment/experiment.hpp"
 #include "redag_lab/experiment/observation.hpp"

@@ -9,9 +9,9 @@
 
 #include <fmt/format.h>
 
+#include "redag/loader/validate.hpp"
+#include "redag/loader/workload_yaml.hpp"
 #include "redag/model/clusters.hpp"
-#include "redag/model/validate.hpp"
-#include "redag/model/workload_yaml.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_lab/experiment/factorial.hpp"
 #include "redag_lab/experiment/plan_reader.hpp"

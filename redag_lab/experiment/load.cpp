@@ -7,8 +7,8 @@
 
 #include <fmt/format.h>
 
-#include "redag/model/workload_yaml.hpp"
-#include "redag/model/workload_yaml_values.hpp"
+#include "redag/loader/workload_yaml.hpp"
+#include "redag/loader/workload_yaml_values.hpp"
 #include "redag/trace/output_file.hpp"
 #include "redag/version.hpp"
 #include "redag_lab/experiment/acceptance.hpp"

@@ -15,9 +15,9 @@
 #include <utility>
 #include <vector>
 
-#include "redag/model/validate.hpp"
-#include "redag/model/workload_yaml_tree.hpp"
-#include "redag/model/workload_yaml_values.hpp"
+#include "redag/loader/validate.hpp"
+#include "redag/loader/workload_yaml_tree.hpp"
+#include "redag/loader/workload_yaml_values.hpp"
 #include "redag_lab/experiment/grid.hpp"
 #include "redag_lab/workload/generate.hpp"
 

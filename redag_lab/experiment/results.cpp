@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "redag/base/check.hpp"
-#include "redag/base/provenance.hpp"
+#include "redag/loader/provenance.hpp"
 
 namespace redag::experiment {
 namespace {

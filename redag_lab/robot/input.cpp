@@ -5,7 +5,7 @@
 
 #include <utility>
 
-#include "redag/model/workload_yaml_node.hpp"
+#include "redag/loader/workload_yaml_node.hpp"
 #include "redag_lab/robot/union.hpp"
 
 namespace redag::robot {

@@ -9,7 +9,7 @@
 #include <string_view>
 
 #include "redag/base/result.hpp"
-#include "redag/model/workload_yaml.hpp"
+#include "redag/loader/workload_yaml.hpp"
 #include "redag_lab/robot/robot_yaml.hpp"
 
 namespace redag::robot {

@@ -19,8 +19,8 @@
 
 #include "redag/base/cpu_list.hpp"
 #include "redag/base/text.hpp"
-#include "redag/model/workload_yaml_node.hpp"
-#include "redag/model/workload_yaml_values.hpp"
+#include "redag/loader/workload_yaml_node.hpp"
+#include "redag/loader/workload_yaml_values.hpp"
 
 namespace redag::robot {
 namespace {

@@ -8,8 +8,8 @@
 #include <string>
 
 #include "redag/base/result.hpp"
-#include "redag/model/workload_yaml.hpp"
-#include "redag/model/workload_yaml_tree.hpp"
+#include "redag/loader/workload_yaml.hpp"
+#include "redag/loader/workload_yaml_tree.hpp"
 #include "redag_lab/robot/robot.hpp"
 
 namespace redag::robot {

@@ -7,7 +7,7 @@
 
 #include <string>
 
-#include "redag/model/text_file.hpp"
+#include "redag/loader/text_file.hpp"
 #include "redag_lab/robot/input.hpp"
 #include "tests/testing/repository.hpp"
 

@@ -15,9 +15,9 @@
 #include <utility>
 #include <vector>
 
-#include "redag/runtime/common_order.hpp"
-#include "redag/runtime/setup.hpp"
 #include "redag/sched/priority_scheduler.hpp"
+#include "redag/threads/common_order.hpp"
+#include "redag/threads/setup.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
 #include "redag_lab/robot/union.hpp"
 #include "tests/testing/bound_property.hpp"

@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "redag/model/validate.hpp"
-#include "redag/runtime/setup.hpp"
+#include "redag/loader/validate.hpp"
 #include "redag/sched/policy.hpp"
+#include "redag/threads/setup.hpp"
 #include "redag_lab/robot/links.hpp"
 #include "redag_lab/robot/reservation.hpp"
 

@@ -7,7 +7,7 @@
 #pragma once
 
 #include "redag/base/result.hpp"
-#include "redag/model/workload_yaml.hpp"
+#include "redag/loader/workload_yaml.hpp"
 #include "redag_lab/robot/robot.hpp"
 
 namespace redag::robot {

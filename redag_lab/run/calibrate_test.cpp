@@ -7,7 +7,7 @@
 
 #include <atomic>
 
-#include "redag/model/validate.hpp"
+#include "redag/loader/validate.hpp"
 #include "redag_lab/run/stall_probe.hpp"
 #include "tests/testing/trace_builder.hpp"
 

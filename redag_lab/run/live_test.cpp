@@ -10,14 +10,14 @@
 #include <stdexcept>
 #include <thread>
 
+#include "redag/engine/coroutine.hpp"
 #include "redag/live/reader.hpp"
 #include "redag/runtime/async_event.hpp"
-#include "redag/runtime/clock.hpp"
-#include "redag/runtime/coroutine.hpp"
 #include "redag/runtime/device_handle.hpp"
 #include "redag/runtime/executor.hpp"
 #include "redag/runtime/live_sample.hpp"
 #include "redag/sched/priority_scheduler.hpp"
+#include "redag/threads/clock.hpp"
 #include "redag_analysis/metrics/summary.hpp"
 #include "redag_lab/run/run_workload.hpp"
 #include "tests/testing/builders.hpp"

@@ -8,8 +8,8 @@
 
 #include <cstdint>
 
-#include "redag/runtime/clock.hpp"
-#include "redag/runtime/parker.hpp"
+#include "redag/threads/clock.hpp"
+#include "redag/threads/parker.hpp"
 
 namespace redag::lab {
 

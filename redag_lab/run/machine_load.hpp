@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
-#include "redag/runtime/threads.hpp"
+#include "redag/threads/threads.hpp"
 
 namespace redag::lab {
 

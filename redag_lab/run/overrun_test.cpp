@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "redag/runtime/clock.hpp"
+#include "redag/threads/clock.hpp"
 #include "redag_analysis/metrics/assumptions.hpp"
 #include "redag_lab/run/run_workload.hpp"
 #include "redag_lab/run/synthetic.hpp"

@@ -18,7 +18,7 @@
 
 #include <fmt/format.h>
 
-#include "redag/model/workload_yaml.hpp"
+#include "redag/loader/workload_yaml.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/output_file.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"

@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
+#include "redag/engine/engine.hpp"
 #include "redag/model/workload.hpp"
-#include "redag/runtime/engine.hpp"
 #include "redag/runtime/watchdog.hpp"
 #include "redag/sched/scheduler.hpp"
 #include "redag/trace/events_file.hpp"

@@ -15,8 +15,8 @@
 #include <utility>
 #include <vector>
 
-#include "redag/runtime/setup.hpp"
-#include "redag/runtime/threads.hpp"
+#include "redag/threads/setup.hpp"
+#include "redag/threads/threads.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"
 #include "tests/testing/builders.hpp"

@@ -13,8 +13,8 @@
 
 #include "redag/model/clusters.hpp"
 #include "redag/model/modes.hpp"
-#include "redag/runtime/threads.hpp"
 #include "redag/sched/cluster_config.hpp"
+#include "redag/threads/threads.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
 #include "redag_analysis/analyze/executors.hpp"
 #include "redag_analysis/executors/executors.hpp"

@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "redag/base/int128.hpp"
-#include "redag/runtime/clock.hpp"
-#include "redag/runtime/parker.hpp"
-#include "redag/runtime/threads.hpp"
+#include "redag/threads/clock.hpp"
+#include "redag/threads/parker.hpp"
+#include "redag/threads/threads.hpp"
 
 namespace redag::lab {
 namespace {

@@ -8,12 +8,12 @@
 #include <thread>
 
 #include "redag/base/relax.hpp"
+#include "redag/engine/coroutine_body.hpp"
+#include "redag/engine/preemption_point.hpp"
 #include "redag/model/demand.hpp"
 #include "redag/model/waits.hpp"
-#include "redag/runtime/clock.hpp"
-#include "redag/runtime/coroutine_body.hpp"
 #include "redag/runtime/device_handle.hpp"
-#include "redag/runtime/preemption_point.hpp"
+#include "redag/threads/clock.hpp"
 
 namespace redag::lab {
 namespace {

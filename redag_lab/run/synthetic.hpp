@@ -9,8 +9,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "redag/engine/engine.hpp"
 #include "redag/model/workload.hpp"
-#include "redag/runtime/engine.hpp"
 
 namespace redag::lab {
 

@@ -8,7 +8,7 @@
 #include "redag/base/check.hpp"
 #include "redag/base/nearest.hpp"
 #include "redag/base/text.hpp"
-#include "redag/model/validate.hpp"
+#include "redag/loader/validate.hpp"
 #include "redag_analysis/executors/executors.hpp"
 
 namespace redag::lab {

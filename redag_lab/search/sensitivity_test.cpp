@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "redag/model/validate.hpp"
+#include "redag/loader/validate.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_analysis/sim/simulator.hpp"
 #include "tests/testing/bound_property.hpp"

@@ -8,8 +8,8 @@
 
 #include <set>
 
-#include "redag/model/validate.hpp"
-#include "redag/model/workload_yaml.hpp"
+#include "redag/loader/validate.hpp"
+#include "redag/loader/workload_yaml.hpp"
 #include "tests/testing/bound_property.hpp"
 #include "tests/testing/builders.hpp"
 

@@ -15,7 +15,7 @@
 #include <fmt/format.h>
 
 #include "redag/base/check.hpp"
-#include "redag/model/validate.hpp"
+#include "redag/loader/validate.hpp"
 #include "redag_lab/workload/generate_utilization.hpp"
 
 namespace redag::lab {

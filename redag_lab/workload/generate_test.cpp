@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include "redag/model/validate.hpp"
+#include "redag/loader/validate.hpp"
 #include "redag_lab/workload/generate_utilization.hpp"
 
 namespace redag::lab {

@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "redag/base/rng.hpp"
-#include "redag/model/validate.hpp"
+#include "redag/loader/validate.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/jobs.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"

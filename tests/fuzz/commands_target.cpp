@@ -9,7 +9,7 @@
 
 #include "redag/base/check.hpp"
 #include "redag/base/time.hpp"
-#include "redag/model/workload_yaml.hpp"
+#include "redag/loader/workload_yaml.hpp"
 #include "redag_lab/cli/terminal/program.hpp"
 #include "tests/fuzz/scratch_file.hpp"
 #include "tests/fuzz/targets.hpp"

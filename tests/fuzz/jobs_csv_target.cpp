@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include "redag/base/check.hpp"
-#include "redag/model/workload_yaml.hpp"
+#include "redag/loader/workload_yaml.hpp"
 #include "redag_analysis/metrics/jobs_csv.hpp"
 #include "tests/fuzz/targets.hpp"
 

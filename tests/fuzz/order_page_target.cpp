@@ -5,7 +5,7 @@
 
 #include "redag/base/check.hpp"
 #include "redag/live/order_page.hpp"
-#include "redag/runtime/common_order.hpp"
+#include "redag/threads/common_order.hpp"
 #include "tests/fuzz/targets.hpp"
 
 namespace redag::fuzz {

@@ -7,8 +7,8 @@
 #include <stdexcept>
 
 #include "protocol.hpp"
-#include "redag/runtime/clock.hpp"
-#include "redag/runtime/threads.hpp"
+#include "redag/threads/clock.hpp"
+#include "redag/threads/threads.hpp"
 
 namespace redag::model_check {
 namespace {

@@ -6,7 +6,7 @@
 #include "protocol.hpp"
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/pi_mutex.hpp"
-#include "redag/runtime/in_progress.hpp"
+#include "redag/engine/in_progress.hpp"
 
 namespace redag::model_check {
 namespace {

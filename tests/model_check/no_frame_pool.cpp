@@ -4,7 +4,7 @@
 // Frames without a pool, which outlives an execution and would take the explorer's locks with it into the next one.
 #include <new>
 
-#include "redag/runtime/frame_pool.hpp"
+#include "redag/engine/frame_pool.hpp"
 
 namespace redag::runtime {
 

@@ -15,9 +15,9 @@
 #include <string>
 #include <vector>
 
-#include "redag/runtime/engine.hpp"
-#include "redag/runtime/preemption_point.hpp"
-#include "redag/runtime/running_job.hpp"
+#include "redag/engine/engine.hpp"
+#include "redag/engine/preemption_point.hpp"
+#include "redag/engine/running_job.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "tests/testing/builders.hpp"
 #include "tests/testing/explorer.hpp"

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "protocol.hpp"
+#include "redag/engine/coroutine_body.hpp"
 #include "redag/runtime/async_event.hpp"
-#include "redag/runtime/coroutine_body.hpp"
 
 namespace redag::model_check {
 namespace {

@@ -24,10 +24,10 @@
 #include <thread>
 #include <vector>
 
+#include "redag/engine/preemption_point.hpp"
 #include "redag/live/publisher.hpp"
 #include "redag/live/reader.hpp"
 #include "redag/runtime/executor.hpp"
-#include "redag/runtime/preemption_point.hpp"
 #include "tests/soak/process_figures.hpp"
 #include "tests/soak/trend.hpp"
 

@@ -11,9 +11,9 @@
 #include <gtest/gtest.h>
 
 #include "redag/base/rng.hpp"
+#include "redag/loader/validate.hpp"
 #include "redag/model/clusters.hpp"
 #include "redag/model/demand.hpp"
-#include "redag/model/validate.hpp"
 #include "redag/sched/cluster_config.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_analysis/executors/executors.hpp"

@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "redag/base/rng.hpp"
-#include "redag/runtime/setup.hpp"
 #include "redag/sched/policy.hpp"
+#include "redag/threads/setup.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"
 #include "tests/testing/drivers.hpp"
 #include "tests/testing/environment.hpp"

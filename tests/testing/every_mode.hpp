@@ -8,7 +8,7 @@
 
 #include <string>
 
-#include "redag/runtime/setup.hpp"
+#include "redag/threads/setup.hpp"
 
 namespace redag::testing {
 

@@ -17,7 +17,7 @@
 #include <fmt/format.h>
 
 #include "redag/base/rng.hpp"
-#include "redag/model/validate.hpp"
+#include "redag/loader/validate.hpp"
 #include "redag/sched/cluster_config.hpp"
 #include "redag_analysis/executors/clustered.hpp"
 #include "redag_analysis/metrics/deadline_watch.hpp"

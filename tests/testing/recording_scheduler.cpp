@@ -9,7 +9,7 @@
 #include <map>
 #include <optional>
 
-#include "redag/runtime/clock.hpp"
+#include "redag/threads/clock.hpp"
 
 namespace redag::testing {
 

@@ -41,7 +41,7 @@ set(alone
 # scheduler 25 % more instructions, and the engine 11 % (tools/count_instructions).
 if(NOT CMAKE_BUILD_TYPE STREQUAL "Debug")
   file(GLOB hot RELATIVE ${PROJECT_SOURCE_DIR} CONFIGURE_DEPENDS redag/sched/*.cpp redag/runtime/engine*.cpp
-    redag/runtime/job_placement.cpp redag/runtime/release_*.cpp redag/runtime/waiting_jobs.cpp redag_analysis/sim/*.cpp)
+    redag/engine/job_placement.cpp redag/runtime/release_*.cpp redag/engine/waiting_jobs.cpp redag_analysis/sim/*.cpp)
   list(FILTER hot EXCLUDE REGEX "_test\\.cpp$")
   list(APPEND alone ${hot})
   # The rest gains nothing from -O3, and compiles in less time without it.

@@ -14,7 +14,7 @@
 #include "evaluation/benchmarks/scheduler_loop.hpp"
 #include "evaluation/benchmarks/waiting_pair.hpp"
 #include "redag/base/check.hpp"
-#include "redag/runtime/setup.hpp"
+#include "redag/threads/setup.hpp"
 #include "redag_analysis/sim/simulator.hpp"
 #include "virtual_time.hpp"
 

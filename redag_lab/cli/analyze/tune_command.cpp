@@ -8,7 +8,7 @@
 #include <memory>
 
 #include "redag/base/text.hpp"
-#include "redag/model/validate.hpp"
+#include "redag/loader/validate.hpp"
 #include "redag_lab/cli/analyze/tuning_report.hpp"
 #include "redag_lab/cli/run/run_arguments.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"

@@ -6,8 +6,8 @@
 #include <memory>
 #include <string>
 
-#include "redag/base/provenance.hpp"
 #include "redag/base/text.hpp"
+#include "redag/loader/provenance.hpp"
 #include "redag_analysis/text/table.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/files.hpp"

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <memory>
 
-#include "redag/model/validate.hpp"
-#include "redag/model/workload_yaml.hpp"
+#include "redag/loader/validate.hpp"
+#include "redag/loader/workload_yaml.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/files.hpp"
 #include "redag_lab/cli/terminal/options.hpp"

@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "redag/base/time.hpp"
+#include "redag/loader/workload_yaml.hpp"
 #include "redag/model/overheads.hpp"
 #include "redag/model/workload.hpp"
-#include "redag/model/workload_yaml.hpp"
 #include "redag_lab/cli/terminal/console.hpp"
 #include "redag_lab/cli/terminal/progress.hpp"
 #include "redag_lab/run/session.hpp"

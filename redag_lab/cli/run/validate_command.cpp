@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "redag/base/words.hpp"
-#include "redag/model/hyperperiod_warning.hpp"
+#include "redag/loader/hyperperiod_warning.hpp"
 #include "redag_analysis/sim/simulator.hpp"
 #include "redag_analysis/text/tint.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"

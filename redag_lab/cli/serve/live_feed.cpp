@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "redag/base/lock_guard.hpp"
-#include "redag/runtime/clock.hpp"
+#include "redag/threads/clock.hpp"
 #include "redag_lab/cli/top/live_json.hpp"
 
 namespace redag::cli {

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "redag/live/reader.hpp"
-#include "redag/runtime/clock.hpp"
+#include "redag/threads/clock.hpp"
 #include "redag_lab/cli/serve/access.hpp"
 #include "redag_lab/cli/serve/live_feed.hpp"
 #include "redag_lab/cli/serve/metrics.hpp"

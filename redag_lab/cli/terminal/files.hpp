@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
-#include "redag/model/workload_yaml.hpp"
+#include "redag/loader/workload_yaml.hpp"
 
 namespace redag::cli {
 

@@ -3,7 +3,7 @@
 
 #include "redag_lab/cli/terminal/json.hpp"
 
-#include "redag/base/provenance.hpp"
+#include "redag/loader/provenance.hpp"
 
 namespace redag::cli {
 

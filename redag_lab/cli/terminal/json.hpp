@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// JSON of the commands. Every document has its provenance (redag/base/provenance.hpp).
+// JSON of the commands. Every document has its provenance (redag/loader/provenance.hpp).
 #pragma once
 
 #include <nlohmann/json.hpp>

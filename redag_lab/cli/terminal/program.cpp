@@ -11,8 +11,8 @@
 #include <exception>
 #include <new>
 
-#include "redag/base/provenance.hpp"
 #include "redag/base/text.hpp"
+#include "redag/loader/provenance.hpp"
 #include "redag/version.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/help.hpp"

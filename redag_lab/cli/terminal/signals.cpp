@@ -7,7 +7,7 @@
 
 #include "redag/base/check.hpp"
 #include "redag/base/time.hpp"
-#include "redag/runtime/clock.hpp"
+#include "redag/threads/clock.hpp"
 
 namespace redag::cli {
 namespace {

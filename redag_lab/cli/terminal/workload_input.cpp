@@ -10,8 +10,8 @@
 #include <cstring>
 #include <utility>
 
-#include "redag/model/text_file.hpp"
-#include "redag/model/workload_yaml_node.hpp"
+#include "redag/loader/text_file.hpp"
+#include "redag/loader/workload_yaml_node.hpp"
 #include "redag/trace/output_file.hpp"
 
 namespace redag::cli {

@@ -9,7 +9,7 @@
 
 #include "redag/base/text.hpp"
 #include "redag/live/writer.hpp"
-#include "redag/runtime/clock.hpp"
+#include "redag/threads/clock.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/options.hpp"
 #include "redag_lab/cli/terminal/screen.hpp"

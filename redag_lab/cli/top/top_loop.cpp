@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "redag/runtime/clock.hpp"
+#include "redag/threads/clock.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/screen.hpp"
 #include "redag_lab/cli/terminal/signals.hpp"

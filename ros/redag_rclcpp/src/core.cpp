@@ -13,9 +13,9 @@
 
 #include "engine_setup.hpp"
 #include "rclcpp/logging.hpp"
-#include "redag/runtime/clock.hpp"
 #include "redag/runtime/live_sample.hpp"
-#include "redag/runtime/threads.hpp"
+#include "redag/threads/clock.hpp"
+#include "redag/threads/threads.hpp"
 
 namespace redag_rclcpp {
 

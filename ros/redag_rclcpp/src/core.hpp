@@ -17,22 +17,22 @@
 #include <thread>
 #include <vector>
 
-#include "bridge.hpp"
-#include "callback.hpp"
-#include "deadlock_watch.hpp"
+#include "entities/bridge.hpp"
+#include "entities/callback.hpp"
 #include "learning.hpp"
-#include "middleware_watch.hpp"
-#include "notes.hpp"
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/pi_mutex.hpp"
 #include "redag/live/publisher.hpp"
-#include "redag/runtime/parker.hpp"
-#include "redag/runtime/setup.hpp"
 #include "redag/runtime/watchdog.hpp"
+#include "redag/threads/parker.hpp"
+#include "redag/threads/setup.hpp"
 #include "redag_rclcpp/executor.hpp"
 #include "registry.hpp"
 #include "release_timer.hpp"
 #include "task_table.hpp"
+#include "watch/deadlock_watch.hpp"
+#include "watch/middleware_watch.hpp"
+#include "watch/notes.hpp"
 
 namespace redag_rclcpp {
 

@@ -7,10 +7,10 @@
 #include <stdexcept>
 #include <utility>
 
-#include "redag/model/validate.hpp"
+#include "redag/loader/validate.hpp"
 #include "redag/runtime/executor_options.hpp"
-#include "redag/runtime/threads.hpp"
 #include "redag/sched/priority_scheduler.hpp"
+#include "redag/threads/threads.hpp"
 
 namespace redag_rclcpp {
 

@@ -8,8 +8,8 @@
 #include <functional>
 #include <memory>
 
-#include "redag/runtime/engine.hpp"
-#include "redag/runtime/setup.hpp"
+#include "redag/engine/engine.hpp"
+#include "redag/threads/setup.hpp"
 #include "redag_rclcpp/executor.hpp"
 
 namespace redag_rclcpp {

@@ -14,10 +14,10 @@
 #include "parameter_reader.hpp"
 #include "rclcpp/exceptions.hpp"
 #include "rclcpp/logging.hpp"
+#include "redag/loader/validate.hpp"
+#include "redag/loader/workload_yaml.hpp"
 #include "redag/model/clusters.hpp"
-#include "redag/model/validate.hpp"
-#include "redag/model/workload_yaml.hpp"
-#include "redag/runtime/threads.hpp"
+#include "redag/threads/threads.hpp"
 
 namespace redag_rclcpp {
 namespace {

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "compat.hpp"
-#include "redag/model/validate.hpp"
+#include "redag/loader/validate.hpp"
 
 namespace redag_rclcpp {
 

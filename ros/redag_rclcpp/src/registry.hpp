@@ -17,9 +17,9 @@
 #include <utility>
 #include <vector>
 
-#include "bridge.hpp"
-#include "callback.hpp"
-#include "entities.hpp"
+#include "entities/bridge.hpp"
+#include "entities/callback.hpp"
+#include "entities/entities.hpp"
 #include "rclcpp/callback_group.hpp"
 #include "rclcpp/context.hpp"
 #include "rclcpp/node_interfaces/node_base_interface.hpp"

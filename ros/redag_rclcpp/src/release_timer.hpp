@@ -12,8 +12,8 @@
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/pi_mutex.hpp"
 #include "redag/base/result.hpp"
-#include "redag/runtime/engine.hpp"
-#include "redag/runtime/release_thread.hpp"
+#include "redag/engine/engine.hpp"
+#include "redag/threads/release_thread.hpp"
 #include "timer_queue.hpp"
 
 namespace redag_rclcpp {

@@ -9,7 +9,7 @@
 #include <cstdlib>
 #include <set>
 
-#include "redag/model/validate.hpp"
+#include "redag/loader/validate.hpp"
 #include "redag/runtime/live_sample.hpp"
 #include "redag/runtime/stats.hpp"
 

@@ -12,16 +12,16 @@
 #include <utility>
 #include <vector>
 
-#include "callback.hpp"
-#include "deadlock_detector.hpp"
+#include "entities/callback.hpp"
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/pi_mutex.hpp"
+#include "redag/engine/engine.hpp"
 #include "redag/live/frame_builder.hpp"
 #include "redag/model/callback_match.hpp"
 #include "redag/model/workload.hpp"
-#include "redag/runtime/engine.hpp"
 #include "redag/trace/trace.hpp"
 #include "redag_rclcpp/executor.hpp"
+#include "watch/deadlock_detector.hpp"
 
 namespace redag_rclcpp {
 

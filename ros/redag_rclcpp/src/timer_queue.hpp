@@ -9,7 +9,7 @@
 
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/pi_mutex.hpp"
-#include "redag/runtime/engine.hpp"
+#include "redag/engine/engine.hpp"
 
 namespace redag_rclcpp {
 

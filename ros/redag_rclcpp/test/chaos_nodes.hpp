@@ -21,7 +21,7 @@
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/pi_mutex.hpp"
 #include "redag/base/rng.hpp"
-#include "redag/runtime/preemption_point.hpp"
+#include "redag/engine/preemption_point.hpp"
 #include "redag_rclcpp/executor.hpp"
 #include "rosgraph_msgs/msg/clock.hpp"
 #include "test_msgs/msg/strings.hpp"

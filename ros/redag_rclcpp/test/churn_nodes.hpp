@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "rclcpp/rclcpp.hpp"
-#include "redag/runtime/preemption_point.hpp"
+#include "redag/engine/preemption_point.hpp"
 #include "redag_rclcpp/executor.hpp"
 #include "test_msgs/msg/strings.hpp"
 #include "test_msgs/srv/empty.hpp"

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Tests DeadlockDetector in virtual time, with an executor that is only described.
-#include "deadlock_detector.hpp"
+#include "watch/deadlock_detector.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -27,12 +27,12 @@
 #include "rclcpp_action/rclcpp_action.hpp"
 #include "redag/live/reader.hpp"
 #include "redag/live/writer.hpp"
-#include "redag/runtime/parker.hpp"
+#include "redag/threads/parker.hpp"
 #include "redag_rclcpp/monitor.hpp"
 #include "spinning.hpp"
 #include "test_msgs/action/fibonacci.hpp"
 #include "test_msgs/srv/empty.hpp"
-#include "thread_wait.hpp"
+#include "watch/thread_wait.hpp"
 
 namespace redag_rclcpp {
 namespace {

@@ -20,11 +20,11 @@
 
 #include "mode_test.hpp"
 #include "rclcpp/rclcpp.hpp"
+#include "redag/engine/preemption_point.hpp"
 #include "redag/live/reader.hpp"
 #include "redag/live/writer.hpp"
-#include "redag/model/validate.hpp"
-#include "redag/runtime/parker.hpp"
-#include "redag/runtime/preemption_point.hpp"
+#include "redag/loader/validate.hpp"
+#include "redag/threads/parker.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"
 #include "spinning.hpp"
 

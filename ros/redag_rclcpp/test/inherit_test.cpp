@@ -24,8 +24,8 @@
 #include <thread>
 #include <vector>
 
-#include "redag/runtime/parker.hpp"
-#include "redag/runtime/threads.hpp"
+#include "redag/threads/parker.hpp"
+#include "redag/threads/threads.hpp"
 #include "spinning.hpp"
 
 namespace redag_rclcpp {

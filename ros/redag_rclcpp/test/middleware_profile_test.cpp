@@ -15,12 +15,12 @@
 #include <thread>
 #include <vector>
 
-#include "middleware_threads.hpp"
 #include "mode_test.hpp"
 #include "rcl/context.h"
-#include "redag/runtime/threads.hpp"
+#include "redag/threads/threads.hpp"
 #include "spinning.hpp"
 #include "test_msgs/msg/basic_types.hpp"
+#include "watch/middleware_threads.hpp"
 
 namespace redag_rclcpp {
 namespace {

@@ -19,14 +19,14 @@
 
 #include "fake_middleware/fake_middleware.hpp"
 #include "log_capture.hpp"
-#include "middleware_report.hpp"
-#include "middleware_threads.hpp"
 #include "mode_test.hpp"
 #include "rcl/context.h"
-#include "redag/runtime/parker.hpp"
-#include "redag/runtime/threads.hpp"
+#include "redag/threads/parker.hpp"
+#include "redag/threads/threads.hpp"
 #include "spinning.hpp"
-#include "start_routines.hpp"
+#include "watch/middleware_report.hpp"
+#include "watch/middleware_threads.hpp"
+#include "watch/start_routines.hpp"
 
 namespace redag_rclcpp {
 namespace {

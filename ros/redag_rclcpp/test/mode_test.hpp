@@ -13,7 +13,7 @@
 
 #include "parse.hpp"
 #include "rclcpp/rclcpp.hpp"
-#include "redag/runtime/setup.hpp"
+#include "redag/threads/setup.hpp"
 #include "redag_rclcpp/executor.hpp"
 #include "test_msgs/msg/empty.hpp"
 

@@ -18,7 +18,7 @@
 
 #include "environment.hpp"
 #include "rclcpp/rclcpp.hpp"
-#include "redag/runtime/threads.hpp"
+#include "redag/threads/threads.hpp"
 #include "redag_rclcpp/monitor.hpp"
 
 namespace redag_rclcpp {

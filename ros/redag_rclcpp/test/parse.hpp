@@ -8,7 +8,7 @@
 
 #include <string>
 
-#include "redag/model/workload_yaml.hpp"
+#include "redag/loader/workload_yaml.hpp"
 
 namespace redag_rclcpp {
 

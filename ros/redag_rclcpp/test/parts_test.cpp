@@ -9,12 +9,12 @@
 #include <map>
 #include <random>
 
-#include "hook.hpp"
-#include "redag/runtime/clock.hpp"
+#include "entities/hook.hpp"
+#include "entities/token_queue.hpp"
 #include "redag/sched/priority_scheduler.hpp"
+#include "redag/threads/clock.hpp"
 #include "release_timer.hpp"
 #include "timer_queue.hpp"
-#include "token_queue.hpp"
 
 namespace redag_rclcpp {
 namespace {

@@ -27,8 +27,8 @@
 #include "mode_test.hpp"
 #include "process_tasks.hpp"
 #include "rclcpp/waitable.hpp"
-#include "redag/runtime/parker.hpp"
-#include "redag/runtime/threads.hpp"
+#include "redag/threads/parker.hpp"
+#include "redag/threads/threads.hpp"
 #include "redag_rclcpp/any_waitable.hpp"
 #include "spinning.hpp"
 

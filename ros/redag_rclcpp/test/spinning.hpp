@@ -11,7 +11,7 @@
 #include <chrono>
 #include <thread>
 
-#include "redag/runtime/clock.hpp"
+#include "redag/threads/clock.hpp"
 
 namespace redag_rclcpp {
 

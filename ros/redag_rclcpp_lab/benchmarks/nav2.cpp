@@ -22,7 +22,7 @@
 #include "component_containers.hpp"
 #include "nav2_user.hpp"
 #include "rclcpp/rclcpp.hpp"
-#include "redag/runtime/clock.hpp"
+#include "redag/threads/clock.hpp"
 #include "samples.hpp"
 #include "stack_comparison.hpp"
 

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "nav2_world.hpp"
-#include "redag/runtime/clock.hpp"
+#include "redag/threads/clock.hpp"
 
 namespace redag_rclcpp::lab {
 

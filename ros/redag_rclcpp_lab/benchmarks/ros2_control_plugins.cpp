@@ -18,7 +18,7 @@
 #include "hardware_interface/system_interface.hpp"
 #include "pluginlib/class_list_macros.hpp"
 #include "redag/base/time.hpp"
-#include "redag/runtime/clock.hpp"
+#include "redag/threads/clock.hpp"
 #include "std_msgs/msg/float64.hpp"
 #include "timer_grid.hpp"
 

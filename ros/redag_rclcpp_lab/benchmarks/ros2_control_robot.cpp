@@ -20,7 +20,7 @@
 #include "peers.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "redag/base/time.hpp"
-#include "redag/runtime/clock.hpp"
+#include "redag/threads/clock.hpp"
 #include "redag_rclcpp/executor.hpp"
 #include "redag_rclcpp/monitor.hpp"
 #include "redag_rclcpp/options.hpp"

@@ -11,7 +11,7 @@
 
 #include "rclcpp/rclcpp.hpp"
 #include "rclcpp_components/register_node_macro.hpp"
-#include "redag/runtime/clock.hpp"
+#include "redag/threads/clock.hpp"
 #include "samples.hpp"
 #include "sensor_msgs/image_encodings.hpp"
 #include "sensor_msgs/msg/image.hpp"

@@ -10,7 +10,7 @@
 
 #include "rclcpp/rclcpp.hpp"
 #include "rclcpp_components/register_node_macro.hpp"
-#include "redag/runtime/clock.hpp"
+#include "redag/threads/clock.hpp"
 #include "samples.hpp"
 #include "stack_nodes.hpp"
 #include "timer_grid.hpp"

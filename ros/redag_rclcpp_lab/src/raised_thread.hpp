@@ -6,7 +6,7 @@
 
 #include <pthread.h>
 
-#include "redag/runtime/threads.hpp"
+#include "redag/threads/threads.hpp"
 
 namespace redag_rclcpp::lab {
 

@@ -12,7 +12,7 @@
 
 #include "rclcpp/rclcpp.hpp"
 #include "redag/base/time.hpp"
-#include "redag/runtime/clock.hpp"
+#include "redag/threads/clock.hpp"
 
 namespace redag_rclcpp::lab {
 

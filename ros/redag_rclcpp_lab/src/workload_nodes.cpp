@@ -13,9 +13,9 @@
 #include <thread>
 #include <utility>
 
+#include "redag/engine/preemption_point.hpp"
 #include "redag/model/demand.hpp"
-#include "redag/runtime/clock.hpp"
-#include "redag/runtime/preemption_point.hpp"
+#include "redag/threads/clock.hpp"
 
 namespace redag_rclcpp::lab {
 

@@ -15,7 +15,7 @@
 #include "diagnostic_msgs/msg/diagnostic_array.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "rclcpp/serialization.hpp"
-#include "redag/model/workload_yaml.hpp"
+#include "redag/loader/workload_yaml.hpp"
 #include "redag_rclcpp/executor.hpp"
 #include "redag_rclcpp/monitor.hpp"
 #include "rosbag2_cpp/reader.hpp"

@@ -16,10 +16,10 @@
 
 #include "node_events.hpp"
 #include "peers.hpp"
+#include "redag/loader/workload_yaml.hpp"
 #include "redag/model/callback_match.hpp"
 #include "redag/model/demand.hpp"
-#include "redag/model/workload_yaml.hpp"
-#include "redag/runtime/setup.hpp"
+#include "redag/threads/setup.hpp"
 #include "redag/trace/worker_count.hpp"
 #include "redag_analysis/metrics/jobs.hpp"
 #include "redag_analysis/metrics/trace_checker.hpp"

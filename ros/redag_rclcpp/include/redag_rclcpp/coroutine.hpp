@@ -25,8 +25,8 @@
 #include "rclcpp/clock.hpp"
 #include "rclcpp/function_traits.hpp"
 #include "rclcpp/service.hpp"
+#include "redag/engine/coroutine.hpp"
 #include "redag/runtime/async_event.hpp"
-#include "redag/runtime/coroutine.hpp"
 #include "redag/runtime/device_handle.hpp"
 
 namespace redag_rclcpp {

@@ -22,10 +22,10 @@
 #include <vector>
 
 #include "rclcpp/executor.hpp"
+#include "redag/engine/engine.hpp"
 #include "redag/model/callback_match.hpp"
 #include "redag/model/workload.hpp"
-#include "redag/runtime/engine.hpp"
-#include "redag/runtime/setup.hpp"
+#include "redag/threads/setup.hpp"
 #include "redag/trace/trace.hpp"
 #include "redag_rclcpp/distribution.hpp"
 

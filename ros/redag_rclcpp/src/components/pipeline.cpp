@@ -12,7 +12,7 @@
 
 #include "rclcpp/rclcpp.hpp"
 #include "rclcpp_components/register_node_macro.hpp"
-#include "redag/runtime/preemption_point.hpp"
+#include "redag/engine/preemption_point.hpp"
 #include "std_msgs/msg/float64.hpp"
 
 namespace redag_rclcpp::examples {

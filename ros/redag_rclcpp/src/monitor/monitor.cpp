@@ -20,7 +20,7 @@
 #include "rclcpp/logging.hpp"
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/mutex.hpp"
-#include "redag/model/workload_yaml.hpp"
+#include "redag/loader/workload_yaml.hpp"
 #include "redag/trace/output_file.hpp"
 #include "report.hpp"
 #include "results.hpp"

@@ -15,7 +15,7 @@
 
 #include "bounds.hpp"
 #include "diagnostic_msgs/msg/diagnostic_array.hpp"
-#include "redag/runtime/setup.hpp"
+#include "redag/threads/setup.hpp"
 #include "redag_rclcpp/executor.hpp"
 
 namespace redag_rclcpp {

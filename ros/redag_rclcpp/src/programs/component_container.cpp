@@ -20,7 +20,7 @@
 
 #include "rclcpp/rclcpp.hpp"
 #include "rclcpp_components/component_manager.hpp"
-#include "redag/runtime/setup.hpp"
+#include "redag/threads/setup.hpp"
 #include "redag_rclcpp/executor.hpp"
 #ifdef REDAG_INHERITS
 #include "redag_rclcpp/inherit.h"

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Replaces redag/runtime/clock.hpp by the explorer's time. Processor time stands still.
+// Replaces redag/threads/clock.hpp by the explorer's time. Processor time stands still.
 #pragma once
 
 #include <ctime>

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Replaces redag/runtime/threads.hpp by the explorer's threads. They grant every request; only starting
+// Replaces redag/threads/threads.hpp by the explorer's threads. They grant every request; only starting
 // thread_that_fails is refused.
 #pragma once
 

@@ -1,0 +1,187 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// The engine's tasks: adds, changes and removes them while jobs run, and reports their counts.
+#include <algorithm>
+
+#include "redag/base/check.hpp"
+#include "redag/base/lock_guard.hpp"
+#include "redag/engine/engine.hpp"
+#include "redag/engine/engine_locked.hpp"
+#include "redag/trace/tap.hpp"
+
+namespace redag::runtime {
+
+void Engine::bind(const Workload &workload, std::vector<Body> bodies) {
+  REDAG_CHECK(bodies.size() == workload.task_count(), "every task needs a body");
+  Locked locked(*this);
+  std::vector<TaskId> ids;
+  for (std::size_t d = 0; d < workload.dags.size(); ++d) {
+    const Dag &dag = workload.dags[d];
+    const std::size_t first = ids.size();
+    for (std::size_t i = 0; i < dag.tasks.size(); ++i) ids.emplace_back(first + i);
+    register_dag(DagId(d), dag, std::span(ids).subspan(first), std::span(bodies).subspan(first, dag.tasks.size()));
+  }
+  tasks_changed();
+}
+
+AddedDag Engine::add_dag(const Dag &dag, std::vector<Body> bodies) {
+  REDAG_CHECK(bodies.size() == dag.tasks.size(), "every task needs a body");
+  const Time at = now();
+  Locked locked(*this);
+  withdraw_if_halting(locked);
+  AddedDag added;
+  added.dag = scheduler_->add_dag(dag, at);
+  const std::span<const TaskId> tasks = scheduler_->tasks_of(added.dag);
+  added.tasks.assign(tasks.begin(), tasks.end());
+  register_dag(added.dag, dag, added.tasks, bodies);
+  dag_deadlines_.resize(std::max<std::size_t>(dag_deadlines_.size(), added.dag.value + 1));
+  dag_deadlines_[added.dag.value] = dag.deadline;
+  tasks_changed();
+  decide(locked, at);
+  return added;
+}
+
+TaskId Engine::add_task(DagId dag, std::uint32_t rank, const Task &task, Body body,
+                        std::shared_ptr<SkipListener> listener) {
+  const Time at = now();
+  Locked locked(*this);
+  withdraw_if_halting(locked);
+  const TaskId id = scheduler_->add_task(dag, rank, task, at);
+  // Its jobs can carry older data. Only the caller knows what follows the task.
+  const TaskRole role{.dag = dag,
+                      .is_sink = true,
+                      .has_predecessors = true,
+                      .dag_deadline = dag.value < dag_deadlines_.size() ? dag_deadlines_[dag.value] : 0};
+  register_task(id, task, role, body, std::move(listener));
+  tasks_changed();
+  decide(locked, at);
+  return id;
+}
+
+void Engine::remove_dag(DagId dag) {
+  std::vector<Body> doomed;  // destroyed without the lock: destructors are the user's code
+  const Time at = now();
+  Locked locked(*this);
+  withdraw_if_halting(locked);
+  REDAG_CHECK(dag.value < scheduler_->dag_slots(), "removal of a DAG that does not exist");
+  for (const TaskId task : scheduler_->tasks_of(dag)) tasks_.remove(task, doomed);
+  scheduler_->remove_dag(dag, at);
+  tasks_changed();
+  decide(locked, at);
+}
+
+void Engine::remove_task(TaskId task) {
+  std::vector<Body> doomed;
+  const Time at = now();
+  Locked locked(*this);
+  withdraw_if_halting(locked);
+  tasks_.remove(task, doomed);
+  tasks_[task].waits_end = true;
+  scheduler_->remove_task(task, at);
+  tasks_changed();
+  waiting_.cancel(task);
+  decide(locked, at);
+}
+
+void Engine::set_predecessors(TaskId task, std::span<const TaskId> predecessors) {
+  const Time at = now();
+  Locked locked(*this);
+  withdraw_if_halting(locked);
+  scheduler_->set_predecessors(task, predecessors, at);
+  decide(locked, at);
+}
+
+void Engine::set_timing(TaskId task, Duration period, Duration deadline) {
+  const Time at = now();
+  Locked locked(*this);
+  withdraw_if_halting(locked);
+  scheduler_->set_timing(task, period, deadline, at);
+  tasks_[task].period = period;
+  tasks_[task].deadline = deadline;
+  settled_ = at;
+  tasks_changed();
+  decide(locked, at);
+}
+
+std::optional<Time> Engine::settled() const {
+  const LockGuard guard(lock_);
+  return settled_;
+}
+
+void Engine::register_dag(DagId id, const Dag &dag, std::span<const TaskId> ids, std::span<Body> bodies) {
+  std::vector<bool> has_successor(dag.tasks.size());
+  for (const Task &task : dag.tasks) {
+    for (const std::uint32_t predecessor : task.predecessors) has_successor[predecessor] = true;
+  }
+  for (std::size_t i = 0; i < dag.tasks.size(); ++i) {
+    const TaskRole role{.dag = id,
+                        .is_sink = !has_successor[i],
+                        .has_predecessors = !dag.tasks[i].predecessors.empty(),
+                        .dag_deadline = dag.deadline};
+    register_task(ids[i], dag.tasks[i], role, bodies[i]);
+  }
+}
+
+void Engine::register_task(TaskId id, const Task &task, const TaskRole &role, Body &body,
+                           std::shared_ptr<SkipListener> listener) {
+  if (listener != nullptr) has_listeners_.store(true, std::memory_order_relaxed);
+  tasks_.add(id, task, role, body, std::move(listener));
+  if (const trace::Tap *const tap = trace::tap(); tap != nullptr) tap->task(this, id, role.dag, task);
+  for (const auto &thread : pool_.threads()) thread->stack.reserve(tasks_.most_started());
+  waiting_.reserve(tasks_.most_started());
+}
+
+sched::Accounting Engine::accounting(TaskId task) const {
+  const LockGuard guard(lock_);
+  sched::Accounting accounting = scheduler_->accounting(task);
+  accounting.skipped -= tasks_[task].withdrawn;
+  accounting.aborted -= tasks_[task].cancelled;
+  return accounting;
+}
+
+Usage Engine::usage(TaskId task) const {
+  const LockGuard guard(lock_);
+  return tasks_[task].usage;
+}
+
+TaskFigures Engine::figures(TaskId task) const {
+  const LockGuard guard(lock_);
+  const TaskEntry &entry = tasks_[task];
+  const std::uint32_t level = scheduler_->level(task);
+  TaskFigures figures{.jobs = scheduler_->accounting(task),
+                      .usage = entry.usage,
+                      .priority = os() && level != sched::kNoLevel ? placement_.priority_of_level(level) : 0,
+                      .active = entry.busy,
+                      .away = entry.away,
+                      .ready = scheduler_->ready(task),
+                      .most_waits = entry.most_waits,
+                      .longest_waits = entry.longest_waits,
+                      .kept_worker = entry.kept_worker,
+                      .late = entry.late,
+                      .late_end_to_end = entry.late_end_to_end,
+                      .preemptions = entry.preemptions,
+                      .response = entry.response,
+                      .end_to_end = entry.end_to_end};
+  figures.jobs.skipped -= entry.withdrawn;
+  figures.jobs.aborted -= entry.cancelled;
+  return figures;
+}
+
+void Engine::figures(std::vector<ThreadFigures> &out) const {
+  out.clear();
+  out.reserve(pool_.size());  // spares allocations under the lock
+  const LockGuard guard(lock_);
+  for (const auto &thread : pool_.threads()) {
+    out.push_back({thread->used, thread->stack.empty() ? TaskId() : thread->stack.back().task});
+  }
+}
+
+void Engine::figures(std::vector<DeviceFigures> &out) const {
+  out.resize(options_.devices.size());
+  for (std::size_t d = 0; d < out.size(); ++d) out[d].serves.reserve(options_.devices[d].slots);
+  const LockGuard guard(lock_);
+  devices_.figures(now(), out);
+}
+
+}  // namespace redag::runtime

@@ -1,0 +1,112 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+#include "redag/loader/validate_waits.hpp"
+
+#include <string>
+#include <string_view>
+#include <unordered_set>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "redag/base/text.hpp"
+#include "redag/loader/validate.hpp"
+#include "redag/model/waits.hpp"
+
+namespace redag {
+namespace {
+
+// Places a finding about one device or wait.
+void refuse(FindingList &findings, Field field, std::size_t item, FieldSet involves, std::string message,
+            std::string hint = {}) {
+  findings.error(field, involves, std::move(message), std::move(hint)).item = static_cast<std::uint32_t>(item);
+}
+
+void check_wait(const Workload &workload, const Task &task, std::size_t index, FindingList &findings) {
+  const Wait &wait = task.waits[index];
+  const auto refuse_it = [&](std::string message, std::string hint = {}) {
+    refuse(findings, Field::Segments, index, Field::Devices, std::move(message), std::move(hint));
+  };
+  if (wait.longest < 1 || wait.longest > kMaxDuration) {
+    refuse_it(fmt::format("a wait of task '{}' must last from 1 ns to {}, not {}", task.name, kMaxDurationText,
+                          format_duration(wait.longest)));
+  }
+  if (wait.shortest < 0 || wait.shortest > wait.longest) {
+    refuse_it(fmt::format("at_least {} of a wait of task '{}' is not from 0 to its longest time {}",
+                          format_duration(wait.shortest), task.name, format_duration(wait.longest)));
+  }
+  if (wait.device.valid() && wait.device.value >= workload.platform.devices.size()) {
+    refuse_it(fmt::format("task '{}' waits for a device that the platform does not have", task.name),
+              "add it to 'devices:' of the platform");
+  }
+  const Duration earliest = index == 0 ? 1 : task.waits[index - 1].after + 1;
+  if (wait.after < earliest || wait.after >= task.wcet) {
+    findings.error(Field::Segments, {},
+                   fmt::format("the waits of task '{}' must be at different points within its wcet", task.name),
+                   "a job executes before each wait and after the last one");
+  }
+}
+
+}  // namespace
+
+void check_devices(const Workload &workload, FindingList &findings) {
+  const std::vector<Device> &devices = workload.platform.devices;
+  if (devices.size() > kMaxDevices) {
+    findings.error(Field::Devices, {},
+                   fmt::format("there are {} devices; at most {} are allowed", devices.size(), kMaxDevices));
+  }
+  if (!devices.empty() && !workload.platform.clusters.empty()) {
+    findings.error(Field::Devices, Field::Clusters, "the platform has both devices and clusters",
+                   "no order of jobs spans two clusters: remove 'devices:' or 'clusters:'");
+  }
+  std::unordered_set<std::string_view> names;
+  for (std::size_t d = 0; d < devices.size(); ++d) {
+    const Device &device = devices[d];
+    if (const std::string why = name_mistake(device.name); !why.empty()) {
+      refuse(findings, Field::Devices, d, {}, fmt::format("the name {} of a device {}", in_quotes(device.name), why));
+    } else if (!names.insert(device.name).second) {
+      refuse(findings, Field::Devices, d, {}, fmt::format("the name '{}' is used by another device", device.name),
+             "choose a unique name for each device");
+    }
+    if (device.slots < 1 || device.slots > kMaxSlots) {
+      refuse(findings, Field::Devices, d, {},
+             fmt::format("slots of device '{}' must be from 1 to {}, not {}", device.name, kMaxSlots, device.slots));
+    }
+  }
+}
+
+void check_waits(const Workload &workload, const Task &task, bool allowed, FindingList &findings) {
+  if (task.waits.empty()) return;
+  if (!allowed) {
+    findings.error(Field::Segments, {}, fmt::format("task '{}' has segments, which cannot be handled here", task.name),
+                   "'redag simulate', 'run' and 'compare' know them, with executors of ReDAG-RT; elsewhere, state "
+                   "'wcet:' in place "
+                   "of 'segments:'");
+  }
+  if (task.waits.size() > kMaxWaits) {
+    findings.error(
+        Field::Segments, {},
+        fmt::format("task '{}' has {} waits; at most {} are allowed", task.name, task.waits.size(), kMaxWaits));
+    return;
+  }
+  if (!workload.platform.clusters.empty()) {
+    findings.error(Field::Segments, Field::Clusters,
+                   fmt::format("task '{}' has segments, but the platform has clusters", task.name),
+                   "waits are known within one order of jobs only: remove 'clusters:', or state 'wcet:'");
+  }
+  for (std::size_t w = 0; w < task.waits.size(); ++w) check_wait(workload, task, w, findings);
+  if (longest_waits(task) > kMaxDuration - task.wcet) {
+    findings.error(Field::Segments, {},
+                   fmt::format("the segments of task '{}' take longer than {} together", task.name, kMaxDurationText));
+    return;
+  }
+  const Duration alone = task.wcet + longest_waits(task);
+  if (task.deadline <= 0 || alone <= task.deadline || task.wcet > task.deadline) return;
+  findings.warning(Field::Segments, Field::Deadline | Field::Period,
+                   fmt::format("the segments of task '{}' take {}, more than its deadline {}", task.name,
+                               format_duration(alone), format_duration(task.deadline)),
+                   "a job that takes its longest times misses its deadline");
+}
+
+}  // namespace redag

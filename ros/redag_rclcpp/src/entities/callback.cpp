@@ -1,0 +1,75 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+#include "entities/callback.hpp"
+
+#include <stdexcept>
+#include <utility>
+
+#include "redag/engine/running_job.hpp"
+#include "redag/engine/waiting_jobs.hpp"
+
+namespace redag_rclcpp {
+
+using redag::sched::Outcome;
+
+Outcome Callback::execute(const redag::runtime::Job &job) {
+  redag::runtime::RunningJob &running = *redag::runtime::RunningJob::current();
+  running.owner = this;
+  if (!run(job.release)) return Outcome::NoData;
+  if (running.waiting == nullptr) count_job(running, job.release);
+  return Outcome::Finished;
+}
+
+void Callback::count_job(redag::runtime::RunningJob &running, Time release) {
+  running.close();
+  const Duration response = running.ended - release;
+  response_.add(response);
+  if (response > deadline()) count_late();
+  execution_.add(running.charged);
+}
+
+std::shared_ptr<ExecutorContext> Callback::context_now() const {
+  const redag::LockGuard guard(lock_);
+  if (!context_) throw redag::WaitCancelled{};  // the callback has left the executor
+  return context_;
+}
+
+redag::runtime::DeviceHandle Callback::device(const std::string &name) const { return context_now()->device(name); }
+
+std::shared_ptr<Callback> Callback::in_own_group(const void *entity) const {
+  return context_now()->find_in_group(task(), entity);
+}
+
+void Callback::let_wait() const {
+  const std::shared_ptr<ExecutorContext> context = context_now();
+  if (!context->direct()) {
+    throw std::logic_error(
+        "redag_rclcpp::coroutine(): a callback can wait only while spin() runs it (spin_some(), spin_all(), "
+        "spin_once() and spin_until_future_complete() have no worker that would go on with it)");
+  }
+  context->let_wait();
+}
+
+// A coroutine that did not wait is counted by execute().
+void Callback::coroutine_ended() {
+  redag::runtime::RunningJob &running = *redag::runtime::RunningJob::current();
+  if (running.waiting != nullptr) count_job(running, running.waiting->job.release);
+}
+
+Callback &this_callback() {
+  const redag::runtime::RunningJob *const running = redag::runtime::RunningJob::current();
+  auto *const callback = running == nullptr ? nullptr : dynamic_cast<Callback *>(running->owner);
+  if (callback != nullptr) return *callback;
+  throw std::logic_error(
+      "redag_rclcpp::coroutine(): the callback runs in no ReDAGExecutor (add its node to one, or use a callback that "
+      "does not wait)");
+}
+
+std::shared_ptr<ExecutorContext> Callback::leave() {
+  std::shared_ptr<ExecutorContext> context = std::exchange(context_, nullptr);
+  if (context) context->timers().schedule(*this, redag::kNever);
+  return context;
+}
+
+}  // namespace redag_rclcpp
