@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Records the run of an engine into the events.redag of a folder (docs/results_format.md). Owns a thread of normal
+// Records the run of an engine into the events.redag of a folder (docs/events.md). Owns a thread of normal
 // priority, which takes the engine's events ten times a second.
 #pragma once
 

@@ -5,7 +5,7 @@
 // first block describes the run. The last one proves that none is missing; it has a fixed length, and a reader finds it
 // from the end. A run can be recorded while it goes on: of a file without its end, readers use the whole blocks, and
 // say so. Neither side holds more than one block of events. BlockHeader in the source has the layout of blocks, and
-// event_codec.hpp that of events. docs/results_format.md has the meaning. Not thread-safe.
+// event_codec.hpp that of events. docs/events.md has the meaning. Not thread-safe.
 #pragma once
 
 #include <cstdint>

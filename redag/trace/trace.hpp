@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // A recorded run: its events in decision order, and what a reader must know to judge them (RunInfo). Plain values; see
-// events_file.hpp and docs/results_format.md for the files.
+// events_file.hpp and docs/events.md for the files.
 #pragma once
 
 #include <cstdint>
