@@ -144,7 +144,8 @@ class Rosdep(unittest.TestCase):
             for file in files_of(package, ".hpp", ".cpp"):
                 if package in ROS_PACKAGES or not file.name.endswith("_test.cpp"):
                     found = re.findall(r'^\s*#\s*include\s*[<"](\w+)/', file.read_text(), re.MULTILINE)
-                    folders.update(folder for folder in found if not (file.parent / folder).is_dir())
+                    homes = file.parent, folder_of(package) / "src"
+                    folders.update(name for name in found if not any((home / name).is_dir() for home in homes))
             self.assertGreater(len(folders), 2, package)
             for folder in folders - OPTIONAL.get(package, set()) - {package}:
                 key = HEADER_FOLDERS.get(folder, folder)
