@@ -47,7 +47,7 @@ analysis::AnalyzeOptions AnalysisWatch::options() {
 
 std::string AnalysisWatch::why_stop() const {
   if (InterruptGuard::interrupted()) return "interrupted";
-  if (arguments_.time_limit && watch_.elapsed() > *arguments_.time_limit) {
+  if (arguments_.time_limit && progress_.elapsed() > *arguments_.time_limit) {
     return fmt::format("the time limit of {} has passed", humanize_duration(*arguments_.time_limit));
   }
   return {};

@@ -41,7 +41,6 @@ class AnalysisWatch {
  private:
   const AnalysisArguments &arguments_;
   Progress progress_;
-  Stopwatch watch_;
 };
 
 /// Adds --json, --all-tasks, --check (with this help), the limits and everything about the platform. The command adds

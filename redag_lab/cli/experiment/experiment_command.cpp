@@ -212,14 +212,13 @@ class Run {
       jobs = 1;
     }
     Progress progress(console_);
-    const Stopwatch watch;
     std::uint64_t finished = 0;
     const auto accept = [&](std::uint64_t unit, const std::string &result) -> Result<void> {
       if (Result<void> kept = store.append(unit, result); !kept) return kept;
       ++finished;
       if (progress.due()) {
-        progress.draw(static_cast<double>(finished) / static_cast<double>(units.size()),
-                      pace(finished, units.size(), watch.elapsed()));
+        const double done = static_cast<double>(finished) / static_cast<double>(units.size());
+        progress.draw(done, fmt::format("{} of {} units{}", finished, units.size(), progress.left(done)));
       }
       return experiment_.add(unit, result);
     };
@@ -229,7 +228,7 @@ class Run {
     // A unit that Ctrl-C interrupted has no result, and this is no error.
     const bool good = InterruptGuard::interrupted() || ok(ran, console_);
     console_.note(fmt::format("{} of {} units in {} on {} processor{}\n", finished, units.size(),
-                              humanize_duration(watch.elapsed()), jobs, jobs == 1 ? "" : "s"));
+                              humanize_duration(progress.elapsed()), jobs, jobs == 1 ? "" : "s"));
     return ok(store.sync(), console_) && good;
   }
 

@@ -95,13 +95,12 @@ std::string describe(const Calibration &calibration, const StreamTraits &termina
 Result<Calibration> measure(const CalibrateOptions &options, Console &console) {
   Progress progress(console);
   progress.set_label("calibrate");
-  const Stopwatch watch;
   lab::CalibrateOptions run;
   run.duration = options.duration;
   run.loaded = options.loaded;
   run.stop = &InterruptGuard::flag();
   run.progress = [&](double done, const char *next) {
-    const Duration left = std::max<Duration>(0, options.duration - watch.elapsed());
+    const Duration left = std::max<Duration>(0, options.duration - progress.elapsed());
     progress.draw(done, fmt::format("{:.0f} s left: {}", static_cast<double>(left) * 1e-9, next));
   };
   return lab::calibrate(run);

@@ -5,7 +5,6 @@
 // second and finally erased. Not thread-safe.
 #pragma once
 
-#include <cstdint>
 #include <string>
 #include <string_view>
 
@@ -34,6 +33,9 @@ class Progress {
   /// uncertain.
   [[nodiscard]] std::string left(double done) const;
 
+  /// Returns the time since the construction.
+  [[nodiscard]] Duration elapsed() const;
+
   /// Erases the line before other text is written.
   void clear();
 
@@ -44,19 +46,6 @@ class Progress {
   Time last_drawn_ = 0;
   bool visible_ = false;
 };
-
-/// Measures the time since its construction.
-class Stopwatch {
- public:
-  Stopwatch();
-  [[nodiscard]] Duration elapsed() const;
-
- private:
-  Time begin_;
-};
-
-/// Returns "3 200 of 8 000, 512/s, 9.4s left" for `done` of `total`, `elapsed` after the start.
-[[nodiscard]] std::string pace(std::uint64_t done, std::uint64_t total, Duration elapsed);
 
 /// Returns "label [#####     ]  50 %  detail", at most `width` columns.
 [[nodiscard]] std::string progress_line(std::string_view label, double done, std::string_view detail,
