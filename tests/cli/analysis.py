@@ -227,13 +227,6 @@ dags:
         self.expect(redag("analyze", self.cart, "--chain", "fast"), 2, "'fast' is a DAG")
         self.expect(redag("analyze", self.cart, "--chain", "fast.act", "--executor", "ste"), 2, "available for ReDAG-RT only")
 
-    def test_an_option_that_takes_the_file_for_its_value(self):
-        for option in ("--explain", "--chain", "--method"):
-            self.expect(redag("analyze", option, self.cart), 2, "FILE is required",
-                        f"{option} has taken '{self.cart}' as its value")
-        self.expect(redag("simulate", "--executor", self.cart), 2)
-        self.expect(redag("sensitivity", "--task", self.cart), 2, f"--task has taken '{self.cart}' as its value")
-
     def test_edges_between_rates_of_another_dag(self):
         text = CART + "  - name: mixed\n    tasks: [{name: a, wcet: 1ms, period: 50ms}, {name: b, wcet: 1ms, period: 100ms, after: a}]\n"
         mixed = self.write("mixed.yaml", text)

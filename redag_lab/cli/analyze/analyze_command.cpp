@@ -183,7 +183,7 @@ Result<Parts> analyse_configured(const Workload &workload, const AnalyzeOptions 
   return lab::analyse_parts(workload, platform, options.executor, watch.options(), options.only);
 }
 
-int analyze_file(const AnalyzeOptions &options, const CLI::App &command, Console &console) {
+int analyze_file(const AnalyzeOptions &options, Console &console) {
   if (options.analysis.run.file.empty()) {
     const bool wants_file = !options.explain.empty() || !options.chains.empty();
     if (options.methods && !wants_file) {
@@ -194,8 +194,7 @@ int analyze_file(const AnalyzeOptions &options, const CLI::App &command, Console
       }
       return kExitOk;
     }
-    console.error("FILE is required" + taken_for_value(command),
-                  "only --methods works without it, alone or with --json");
+    console.error("FILE is required", "only --methods works without it, alone or with --json");
     return kExitBad;
   }
   if (!options.chains.empty() && options.executor != "redag") {
@@ -247,7 +246,7 @@ Action add_analyze(CLI::App &app) {
       ->group("Limits");
   add_analysis_arguments(app, options->analysis,
                          "Exit with status 1 unless a sound method shows that every deadline is met");
-  return [options, &app](Console &console) { return analyze_file(*options, app, console); };
+  return [options](Console &console) { return analyze_file(*options, console); };
 }
 
 }  // namespace redag::cli

@@ -76,20 +76,6 @@ CLI::Option *add_duration(CLI::App &app, const std::string &name, Duration &targ
   return add_duration_to(app, name, target, help, zero_allowed)->default_str(format_duration(target));
 }
 
-std::string taken_for_value(const CLI::App &command) {
-  constexpr std::array<std::string_view, 5> kFiles = {"FILE", "DIR", "RESULT", "WORKLOAD", "ROBOT"};
-  for (const CLI::Option *option : command.get_options()) {
-    if (option->get_positional() || option->get_type_size() == 0) continue;
-    if (std::find(kFiles.begin(), kFiles.end(), option->get_type_name()) != kFiles.end()) continue;
-    for (const std::string &value : option->results()) {
-      std::error_code ignored;
-      if (!std::filesystem::is_regular_file(value, ignored)) continue;
-      return fmt::format(", and {} has taken {} as its value", option->get_name(), in_quotes(value));
-    }
-  }
-  return {};
-}
-
 CLI::Option &option_named(CLI::App &app, std::string_view name) {
   for (CLI::Option *option : app.get_options()) {
     for (const std::string &own : option->get_lnames()) {
@@ -116,10 +102,6 @@ CLI::Option *add_seed(CLI::App &app, std::uint64_t &target, const std::string &h
 CLI::Option *add_number(CLI::App &app, const std::string &name, double &target, Range<double> range,
                         const std::string &help) {
   return add_number_to(app, name, target, range, help, "X");
-}
-
-std::uint32_t parse_count(const std::string &name, const std::string &text, Range<std::uint32_t> range) {
-  return parse_number(name, text, range);
 }
 
 const Choices<PolicyKind> &policy_choices() {

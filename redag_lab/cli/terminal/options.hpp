@@ -57,10 +57,6 @@ inline constexpr std::uint64_t kMaxEvents = 1'000'000'000;
 /// when memory runs out: it compares names in a noexcept function.
 CLI::Option &option_named(CLI::App &app, std::string_view name);
 
-/// Returns ", and --explain has taken 'FILE' as its value" if an option of the command has an existing file for a value
-/// that is none; empty otherwise. For messages about a missing FILE.
-[[nodiscard]] std::string taken_for_value(const CLI::App &command);
-
 /// Adds a whole number; the help shows its default.
 CLI::Option *add_count(CLI::App &app, const std::string &name, std::uint32_t &target, Range<std::uint32_t> range,
                        const std::string &help);
@@ -71,9 +67,6 @@ CLI::Option *add_seed(CLI::App &app, std::uint64_t &target, const std::string &h
 /// Adds a finite number; the help shows its default.
 CLI::Option *add_number(CLI::App &app, const std::string &name, double &target, Range<double> range,
                         const std::string &help);
-
-/// Parses a number such as "3" within `range`; throws as reject() does.
-[[nodiscard]] std::uint32_t parse_count(const std::string &name, const std::string &text, Range<std::uint32_t> range);
 
 /// Adds an option with a list of choices, which the help shows. `Target` is Value or std::optional<Value>.
 template <class Value, class Target>

@@ -153,25 +153,10 @@ int usage_error(Console &console, const std::string &message, const std::string 
   return kExitBad;
 }
 
-// Returns the innermost subcommand on the command line, or null.
-CLI::App *chosen(CLI::App &app) {
+// Returns the command on the command line, or null.
+CLI::App *chosen(const CLI::App &app) {
   const auto parsed = app.get_subcommands();
-  if (parsed.empty()) return nullptr;
-  CLI::App *inner = chosen(*parsed.front());
-  return inner != nullptr ? inner : parsed.front();
-}
-
-// Returns a name such as "simulate", or "" for the program itself.
-std::string name_of(const CLI::App *command) {
-  if (command == nullptr || command->get_parent() == nullptr) return {};
-  const std::string outer = name_of(command->get_parent());
-  return outer.empty() ? command->get_name() : outer + " " + command->get_name();
-}
-
-// Returns the text before the command's own name in its usage line.
-std::string help_prefix(const CLI::App &command) {
-  const std::string outer = name_of(command.get_parent());
-  return outer.empty() ? "redag" : "redag " + outer;
+  return parsed.empty() ? nullptr : parsed.front();
 }
 
 // Returns the arguments with "help COMMAND" as "COMMAND --help", and "version" as "--version".
@@ -218,37 +203,35 @@ int parse_and_run(const std::vector<std::string> &given, Console &console) {
     return usage_error(console, fmt::format("unknown command {} ({})", in_quotes(first), suggestion(first, names)), "");
   }
 
+  const CLI::App *command = nullptr;
+  const auto fail = [&](const std::string &message) {
+    return usage_error(console, message, command == nullptr ? "" : command->get_name());
+  };
   try {
     app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // CLI11 expects the last argument first
+    command = chosen(app);
   } catch (const CLI::CallForHelp &) {
-    CLI::App *command = chosen(app);
-    console.print(command != nullptr ? command->help(help_prefix(*command)) : app.help());
+    command = chosen(app);
+    console.print(command != nullptr ? command->help("redag") : app.help());
     return kExitOk;
   } catch (const CLI::CallForVersion &version) {
     console.print(std::string(version.what()) + "\n");
     return kExitOk;
   } catch (const CLI::ExtrasError &) {
-    CLI::App *command = chosen(app);
-    return usage_error(console, unknown_argument(command != nullptr ? *command : app), name_of(command));
+    command = chosen(app);
+    return fail(unknown_argument(command != nullptr ? *command : app));
   } catch (const CLI::ArgumentMismatch &error) {
-    return usage_error(console, mismatch(error), name_of(chosen(app)));
+    command = chosen(app);
+    return fail(mismatch(error));
   } catch (const CLI::ParseError &error) {
-    CLI::App *command = chosen(app);
-    const std::string said = error.what();
-    const bool lacks_command = said == "A subcommand is required";
-    if (lacks_command) {
-      return usage_error(console, "a command is missing after 'redag " + name_of(command) + "'", name_of(command));
-    }
-    const bool lacks_file = command != nullptr && said.ends_with(" is required");
-    return usage_error(console, said + (lacks_file ? taken_for_value(*command) : ""), name_of(command));
+    command = chosen(app);
+    return fail(error.what());
   }
-  if (const CLI::App *command = chosen(app); command != nullptr) {
-    if (const std::string option = find_empty(*command); !option.empty()) {
-      return usage_error(console, option + ": the value is empty", name_of(command));
-    }
+  if (command != nullptr) {
+    if (const std::string option = find_empty(*command); !option.empty()) return fail(option + ": the value is empty");
   }
-  for (const auto &[command, action] : actions) {
-    if (command->parsed()) return action(console);
+  for (const auto &[own, action] : actions) {
+    if (own == command) return action(console);
   }
   return usage_error(console, "no command is given", "");
 }
