@@ -20,7 +20,6 @@
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_lab/cli/terminal/files.hpp"
 #include "redag_lab/cli/terminal/options.hpp"
-#include "redag_lab/cli/terminal/workload_input.hpp"
 
 namespace redag::cli {
 namespace {

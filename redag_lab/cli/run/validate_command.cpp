@@ -12,8 +12,8 @@
 #include "redag_analysis/sim/simulator.hpp"
 #include "redag_analysis/text/tint.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
+#include "redag_lab/cli/terminal/files.hpp"
 #include "redag_lab/cli/terminal/json.hpp"
-#include "redag_lab/cli/terminal/workload_input.hpp"
 
 namespace redag::cli {
 namespace {

@@ -14,8 +14,11 @@
 #include <filesystem>
 #include <memory>
 #include <system_error>
+#include <utility>
 
 #include "redag/base/text.hpp"
+#include "redag/loader/text_file.hpp"
+#include "redag/loader/workload_yaml_node.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/output_file.hpp"
 #include "redag_lab/run/variant.hpp"
@@ -35,12 +38,38 @@ Result<void> write_in_place(const std::string &path, std::string_view text) {
   return trace::file_error(path, 0, fmt::format("cannot write: {}", std::strerror(errno)));
 }
 
+Result<std::string> read_standard_input() {
+  std::string text;
+  std::string block(std::size_t{1} << 16U, '\0');
+  while (text.size() <= kMaxWorkloadBytes) {
+    const ssize_t count = ::read(STDIN_FILENO, block.data(), block.size());
+    if (count == 0) return text;
+    if (count > 0) {
+      text.append(block, 0, static_cast<std::size_t>(count));
+    } else if (errno != EINTR) {
+      return trace::file_error("<stdin>", 0, fmt::format("cannot read: {}", std::strerror(errno)));
+    }
+  }
+  return trace::file_error("<stdin>", 0, fmt::format("the file is longer than {} bytes", kMaxWorkloadBytes));
+}
+
 // True if the text consists of digits, such as "007" of "mte_007".
 bool is_number(std::string_view text) {
   return !text.empty() && std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
 }
 
 }  // namespace
+
+Result<robot::Input> load_workload_or_robot(const std::string &path, LoadOptions options, std::string *source) {
+  Result<std::string> text =
+      path == "-" ? read_standard_input() : read_text_file(path, "a workload file", kMaxWorkloadBytes);
+  if (!text) return tl::unexpected<Diagnostics>(std::move(text.error()));
+  const bool is_file = path != "-";
+  Result<robot::Input> input = robot::parse_input(*text, is_file ? path : "<stdin>", options);
+  if (input) name_after(is_file ? path : "stdin", input->loaded.workload);
+  if (source != nullptr) *source = *std::move(text);
+  return input;
+}
 
 Result<void> write_text(const std::string &path, std::string_view text) {
   std::error_code ignored;

@@ -10,9 +10,14 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
-#include "redag/loader/workload_yaml.hpp"
+#include "redag_lab/robot/input.hpp"
 
 namespace redag::cli {
+
+/// Reads a workload or a robot from a file, or from standard input if `path` is "-". Leaves its text in `source`, if
+/// that is given.
+[[nodiscard]] Result<robot::Input> load_workload_or_robot(const std::string &path, LoadOptions options = {},
+                                                          std::string *source = nullptr);
 
 /// Writes a whole file or nothing (trace::OutputFile). Devices and pipes are written directly.
 [[nodiscard]] Result<void> write_text(const std::string &path, std::string_view text);
