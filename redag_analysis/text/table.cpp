@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <numeric>
-#include <set>
 #include <utility>
 
 #include "redag/base/check.hpp"
@@ -19,7 +18,6 @@ namespace {
 constexpr std::size_t kGap = 2;          // between columns
 constexpr std::size_t kLeastProse = 24;  // prose does not wrap below this, nor below its longest word
 constexpr std::size_t kShortestCut = 8;  // a name is not cut below this
-constexpr std::size_t kLongestCut = 24;  // nor below the width at which its cells differ, up to this limit
 
 std::size_t longest_word(const std::string &text) {
   std::size_t longest = 0;
@@ -40,7 +38,7 @@ class Table::Layout {
         [this](std::size_t i) { return columns_[i].prose ? std::max(widest(i, longest_word), kLeastProse) : kWhole; });
     // The most important number stays, because names alone tell nothing.
     leave_out([this](std::size_t i) { return !is_name(i); }, 1);
-    narrow([this](std::size_t i) { return columns_[i].number || columns_[i].prose ? kWhole : shortest_cut(i); });
+    narrow([this](std::size_t i) { return columns_[i].number || columns_[i].prose ? kWhole : kShortestCut; });
     if (!is_too_wide()) return;
     // Cut names do not help: the last column shows as much as fits.
     leave_out([](std::size_t) { return true; }, 1);
@@ -80,19 +78,6 @@ class Table::Layout {
     std::size_t most = width(columns_[column].title);
     for (const auto &row : rows_) most = std::max(most, width(row[column].text));
     return most;
-  }
-
-  // The least width at which cells that differ remain different.
-  [[nodiscard]] std::size_t shortest_cut(std::size_t column) const {
-    const auto different = [&](std::size_t width) {
-      std::set<std::string> texts;
-      for (const auto &row : rows_) texts.insert(cut(row[column].text, width));
-      return texts.size();
-    };
-    const std::size_t all = different(kLongestCut);
-    std::size_t width = kShortestCut;
-    while (width < kLongestCut && different(width) < all) ++width;
-    return width;
   }
 
   // Takes columns from the widest one, as many as needed, down to the least width of each.
@@ -135,22 +120,21 @@ void Table::add(std::vector<Cell> row) {
   rows_.push_back(std::move(row));
 }
 
-std::string Table::render(std::size_t width, bool colour) const {
-  const Layout layout(*this, width);
-  std::string text;
+std::vector<std::string> Table::lines(const Layout &layout, bool colour) const {
+  std::vector<std::string> text;
   const auto add_row = [&](const auto &cell_of) {
-    std::vector<std::vector<std::string>> lines(columns_.size());
+    std::vector<std::vector<std::string>> cells(columns_.size());
     std::size_t height = 1;
     for (const std::size_t i : layout.shown()) {
       const Cell cell = cell_of(i);
-      lines[i] = columns_[i].prose ? lines_within(cell.text, layout.width_of(i)) : std::vector{cell.text};
-      height = std::max(height, lines[i].size());
+      cells[i] = columns_[i].prose ? lines_within(cell.text, layout.width_of(i)) : std::vector{cell.text};
+      height = std::max(height, cells[i].size());
     }
     for (std::size_t k = 0; k < height; ++k) {
       std::string line;
       std::size_t blank = 0;  // columns before the next text: without colour, lines have no trailing blanks
       for (const std::size_t i : layout.shown()) {
-        const std::string content = k < lines[i].size() ? cut(lines[i][k], layout.width_of(i)) : std::string();
+        const std::string content = k < cells[i].size() ? cut(cells[i][k], layout.width_of(i)) : std::string();
         const std::size_t space = layout.width_of(i) - display_width(content);
         if (columns_[i].number) blank += space;
         if (!content.empty()) {
@@ -159,13 +143,24 @@ std::string Table::render(std::size_t width, bool colour) const {
         }
         blank += kGap + (columns_[i].number ? 0 : space);
       }
-      text += line + "\n";
+      text.push_back(std::move(line));
     }
   };
   add_row([&](std::size_t i) { return Cell{columns_[i].title, Tint::Strong}; });
   for (const auto &row : rows_) {
     add_row([&](std::size_t i) { return row[i]; });
   }
+  return text;
+}
+
+std::vector<std::string> Table::lines(std::size_t width, bool colour) const {
+  return lines(Layout(*this, width), colour);
+}
+
+std::string Table::render(std::size_t width, bool colour) const {
+  const Layout layout(*this, width);
+  std::string text;
+  for (const std::string &line : lines(layout, colour)) text += line + "\n";
   std::string hidden;
   for (std::size_t i = 0; i < columns_.size(); ++i) {
     if (!layout.shows(i)) hidden += (hidden.empty() ? "" : ", ") + columns_[i].title;

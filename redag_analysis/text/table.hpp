@@ -36,8 +36,12 @@ class Table {
   /// Renders the table, with a newline at the end. `width` is in columns; 0: no limit.
   [[nodiscard]] std::string render(std::size_t width, bool colour) const;
 
+  /// Returns the titles and the rows as lines, without the names of columns that found no room.
+  [[nodiscard]] std::vector<std::string> lines(std::size_t width, bool colour) const;
+
  private:
   class Layout;
+  [[nodiscard]] std::vector<std::string> lines(const Layout &layout, bool colour) const;
 
   std::vector<Column> columns_;
   std::vector<std::vector<Cell>> rows_;

@@ -10,6 +10,8 @@
 namespace redag {
 namespace {
 
+constexpr const char *kReset = "\033[0m";
+
 const char *code_of(Tint tint) {
   switch (tint) {
     case Tint::Plain: break;
@@ -22,21 +24,32 @@ const char *code_of(Tint tint) {
   return "";
 }
 
+/// A character of a text, or a code of tinted(), which takes no column.
+struct Piece {
+  std::size_t bytes;
+  bool is_code;
+};
+
+Piece first_piece(std::string_view text) {
+  if (text.starts_with("\033[")) return {std::min(text.find('m'), text.size() - 1) + 1, true};
+  std::size_t bytes = 1;
+  while (bytes < text.size() && (static_cast<unsigned char>(text[bytes]) & 0xc0U) == 0x80U) ++bytes;
+  return {bytes, false};
+}
+
 }  // namespace
 
 std::string tinted(std::string_view text, Tint tint, bool colour) {
   if (!colour || tint == Tint::Plain) return std::string(text);
-  return fmt::format("{}{}\033[0m", code_of(tint), text);
+  return fmt::format("{}{}{}", code_of(tint), text, kReset);
 }
 
 std::size_t display_width(std::string_view text) {
   std::size_t columns = 0;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    if (text.substr(i).starts_with("\033[")) {
-      i = std::min(text.find('m', i), text.size());  // tinted() writes no other codes
-      continue;
-    }
-    if ((static_cast<unsigned char>(text[i]) & 0xc0U) != 0x80U) ++columns;
+  while (!text.empty()) {
+    const Piece piece = first_piece(text);
+    if (!piece.is_code) ++columns;
+    text.remove_prefix(piece.bytes);
   }
   return columns;
 }
@@ -44,12 +57,15 @@ std::size_t display_width(std::string_view text) {
 std::string cut(std::string_view text, std::size_t width) {
   if (display_width(text) <= width) return std::string(text);
   if (width == 0) return {};
-  std::size_t bytes = 0;
-  for (std::size_t columns = 0; bytes < text.size(); ++bytes) {
-    const bool starts_character = (static_cast<unsigned char>(text[bytes]) & 0xc0U) != 0x80U;
-    if (starts_character && ++columns == width) break;
+  std::size_t kept = 0;
+  bool has_codes = false;
+  for (std::size_t columns = 0;;) {
+    const Piece piece = first_piece(text.substr(kept));
+    if (!piece.is_code && ++columns == width) break;
+    has_codes = has_codes || piece.is_code;
+    kept += piece.bytes;
   }
-  return std::string(text.substr(0, bytes)) + "…";
+  return std::string(text.substr(0, kept)) + "~" + (has_codes ? kReset : "");
 }
 
 }  // namespace redag

@@ -19,7 +19,7 @@ enum class Tint : std::uint8_t { Plain, Good, Bad, Caution, Faint, Strong };
 /// Returns the number of columns of a UTF-8 text, one per code point. Codes of tinted() take none.
 [[nodiscard]] std::size_t display_width(std::string_view text);
 
-/// Returns at most `width` columns of a text without codes; the end of a longer text becomes "…".
+/// Returns at most `width` columns of `text`; the end of a longer text becomes "~".
 [[nodiscard]] std::string cut(std::string_view text, std::size_t width);
 
 }  // namespace redag

@@ -4,32 +4,22 @@
 #include "redag_lab/cli/serve/access.hpp"
 
 #include <fmt/format.h>
-#include <sys/random.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cerrno>
 #include <fstream>
 #include <system_error>
 
 namespace redag::cli {
-namespace {
-
-bool is_letter_or_digit(char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
-
-}  // namespace
 
 Result<std::string> make_token() {
   std::array<unsigned char, 32> bytes{};
-  std::size_t have = 0;
-  while (have < bytes.size()) {
-    const ssize_t got = ::getrandom(bytes.data() + have, bytes.size() - have, 0);
-    if (got < 0 && errno == EINTR) continue;
-    if (got < 0) {
-      return make_error("the kernel gives no random numbers for the token: " + std::generic_category().message(errno));
-    }
-    have += static_cast<std::size_t>(got);
+  if (::getentropy(bytes.data(), bytes.size()) != 0) {
+    return make_error("the kernel gives no random numbers for the token: " + std::generic_category().message(errno));
   }
   std::string token;
   for (const unsigned char byte : bytes) token += fmt::format("{:02x}", byte);
@@ -48,9 +38,10 @@ Result<std::string> read_token(const std::string &path) {
                       fmt::format("chmod 600 {0}, or 640 and the group of the program that reads it", path));
   }
   file >> token;
+  const bool is_plain = std::all_of(token.begin(), token.end(), [](unsigned char c) { return std::isalnum(c) != 0; });
   constexpr std::size_t kLeast = 32;
   constexpr std::size_t kMost = 256;  // a header has room for it
-  if (token.size() < kLeast || token.size() > kMost || !std::all_of(token.begin(), token.end(), is_letter_or_digit)) {
+  if (token.size() < kLeast || token.size() > kMost || !is_plain) {
     return make_error(fmt::format("{}:1: a token has {} to {} letters and digits", path, kLeast, kMost),
                       "make one: openssl rand -hex 32 > FILE");
   }

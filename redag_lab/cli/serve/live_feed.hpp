@@ -1,69 +1,47 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Reads the live pages from time to time for all watchers together, while there are any. Holds the latest state only: a
-// slow watcher misses states and delays nobody.
+// What the browsers of `redag serve` get from time to time: the latest state of the live pages. A slow watcher misses
+// states and delays nobody.
 //
-// Threads: any; the feed has a thread of its own.
+// Threads: any.
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
-#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
-#include <thread>
-#include <vector>
 
 #include "redag/base/mutex.hpp"
 #include "redag/base/thread_annotations.hpp"
 #include "redag/base/time.hpp"
-#include "redag/live/reader.hpp"
 #include "redag_lab/cli/top/attachment.hpp"
 
 namespace redag::cli {
 
-/// The pages at one moment. Documents are made once for all watchers, when the first one asks.
-class LiveState {
- public:
-  LiveState(std::vector<live::Listed> pages, Time now);
-
-  [[nodiscard]] const std::vector<live::Listed> &pages() const { return pages_; }
-  /// Returns the list of executors as JSON, and the frame of one of `pages` (null: none).
-  [[nodiscard]] std::shared_ptr<const std::string> document(const live::Listed *shown);
-
- private:
-  const std::vector<live::Listed> pages_;
-  const Time now_;
-  Mutex lock_;
-  std::vector<std::shared_ptr<const std::string>> documents_
-      REDAG_GUARDED_BY(lock_);  // by page, then that without a frame; null: not asked for
-};
-
 class LiveFeed {
  public:
-  LiveFeed(std::string folder, Duration interval, unsigned most_watchers);
-  ~LiveFeed();
-  LiveFeed(const LiveFeed &) = delete;
-  LiveFeed &operator=(const LiveFeed &) = delete;
+  LiveFeed(std::string folder, Duration interval, unsigned most_watchers)
+      : folder_(std::move(folder)), interval_(interval), most_watchers_(most_watchers) {}
 
   /// One who watches an executor, and its successors of the same name and program. Not thread-safe.
   class Watcher {
    public:
     /// Use LiveFeed::watch().
-    Watcher(LiveFeed &feed, std::optional<LiveTarget> target, std::uint64_t seen)
-        : feed_(feed), attachment_(target), seen_(seen) {}
+    Watcher(LiveFeed &feed, std::optional<LiveTarget> target) : feed_(feed), attachment_(target) {}
     ~Watcher();
     Watcher(const Watcher &) = delete;
     Watcher &operator=(const Watcher &) = delete;
 
-    /// Waits for the next state, and returns its document; null once the feed has ended.
-    [[nodiscard]] std::shared_ptr<const std::string> next();
+    /// Waits for an interval, except at first. Returns the list of executors and the frame of the watched one (null:
+    /// there is none) as JSON; nothing once the feed has ended.
+    [[nodiscard]] std::optional<std::string> next();
 
    private:
     LiveFeed &feed_;
     Attachment attachment_;
-    std::uint64_t seen_;  // number of the last state
+    std::chrono::steady_clock::time_point due_ = {};
   };
 
   /// Returns null if there are too many watchers, or the feed has ended. Without a target, the first readable executor
@@ -74,18 +52,13 @@ class LiveFeed {
   void stop();
 
  private:
-  void main();
-
   const std::string folder_;
   const Duration interval_;
   const unsigned most_watchers_;
   Mutex lock_;
-  std::condition_variable_any changed_;
-  std::shared_ptr<LiveState> state_ REDAG_GUARDED_BY(lock_);
-  std::uint64_t number_ REDAG_GUARDED_BY(lock_) = 0;  // of the state
+  std::condition_variable_any ended_;
   unsigned watchers_ REDAG_GUARDED_BY(lock_) = 0;
   bool stopped_ REDAG_GUARDED_BY(lock_) = false;
-  std::thread thread_;
 };
 
 }  // namespace redag::cli

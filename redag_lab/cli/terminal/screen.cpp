@@ -62,31 +62,12 @@ std::string sequence_of(const char *capability) {
   return text == nullptr || text == absent ? std::string() : std::string(text);
 }
 
-attr_t attributes_of(Tint tint, bool colour) {
-  const auto pair = [&](short number) -> attr_t {
-    return colour ? static_cast<attr_t>(COLOR_PAIR(number)) : attr_t{0};
-  };
-  switch (tint) {
-    case Tint::Plain: return A_NORMAL;
-    case Tint::Good: return pair(1);
-    case Tint::Bad: return colour ? pair(2) : A_BOLD;
-    case Tint::Caution: return pair(3);
-    case Tint::Faint: return A_DIM;
-    case Tint::Strong: return A_BOLD;
-  }
-  return A_NORMAL;
-}
-
-KeyPress mouse_press() {
-  MEVENT event{};
-  if (::getmouse(&event) != OK) return {};
-  KeyPress press;
-  if ((event.bstate & BUTTON4_PRESSED) != 0) press.key = Key::WheelUp;
-  if ((event.bstate & BUTTON5_PRESSED) != 0) press.key = Key::WheelDown;
-  if ((event.bstate & BUTTON1_PRESSED) != 0) press.key = Key::Click;
-  press.line = static_cast<std::size_t>(std::max(event.y, 0));
-  press.column = static_cast<std::size_t>(std::max(event.x, 0));
-  return press;
+// Returns what a code of tinted() means, such as "31" of "\033[31m".
+attr_t attributes_of(std::string_view code) {
+  if (code == "1") return A_BOLD;
+  if (code == "2") return A_DIM;
+  const bool is_colour = code.size() == 2 && code[0] == '3' && code[1] >= '1' && code[1] <= '3';
+  return is_colour && ::has_colors() ? static_cast<attr_t>(COLOR_PAIR(code[1] - '0')) : attr_t{A_NORMAL};
 }
 
 KeyPress press_of(int code) {
@@ -100,6 +81,7 @@ KeyPress press_of(int code) {
     case KEY_NPAGE: return {Key::PageDown};
     case KEY_HOME: return {Key::Home};
     case KEY_END: return {Key::End};
+    case '\t': return {Key::Tab};
     case KEY_ENTER:
     case '\r':
     case '\n': return {Key::Enter};
@@ -107,9 +89,6 @@ KeyPress press_of(int code) {
     case KEY_BACKSPACE:
     case kControlH:
     case kDelete: return {Key::Backspace};
-    case KEY_F(1): return {Key::Help};
-    case KEY_RESIZE: return {Key::Resize};
-    case KEY_MOUSE: return mouse_press();
     default: break;
   }
   if (code >= 0x20 && code < 0x7f) return {Key::Text, static_cast<char>(code)};
@@ -127,12 +106,12 @@ bool Screen::is_possible() {
   return can_move;
 }
 
-Screen::Screen(bool colour) : colour_(colour) {
+Screen::Screen(bool colour) {
   (void)tcgetattr(STDIN_FILENO, &old_terminal);
   expect_utf8();
   (void)::set_escdelay(kEscapeDelay);
   REDAG_CHECK(::initscr() != nullptr, "a terminal that was possible is not");
-  leaving = "\033[?1006l\033[?1000l" + sequence_of("sgr0") + sequence_of("cnorm") + sequence_of("rmcup");
+  leaving = sequence_of("sgr0") + sequence_of("cnorm") + sequence_of("rmcup");
   is_taken = 1;
   struct sigaction fatal {};
   fatal.sa_handler = on_fatal;
@@ -146,14 +125,11 @@ Screen::Screen(bool colour) : colour_(colour) {
   (void)::curs_set(0);
   (void)::keypad(stdscr, TRUE);
   (void)::nodelay(stdscr, TRUE);
-  (void)::mouseinterval(0);
-  (void)::mousemask(BUTTON1_PRESSED | BUTTON4_PRESSED | BUTTON5_PRESSED, nullptr);
-  colour_ = colour_ && ::has_colors() && ::start_color() == OK;
-  if (colour_) {
+  if (colour && ::has_colors() && ::start_color() == OK) {
     const short background = ::use_default_colors() == OK ? short{-1} : short{COLOR_BLACK};
-    (void)::init_pair(1, COLOR_GREEN, background);
-    (void)::init_pair(2, COLOR_RED, background);
-    (void)::init_pair(3, COLOR_YELLOW, background);
+    // The number of a pair is that of the colour in tinted()'s codes.
+    for (const short hue : {short{COLOR_RED}, short{COLOR_GREEN}, short{COLOR_YELLOW}})
+      (void)::init_pair(hue, hue, background);
   }
 }
 
@@ -168,14 +144,23 @@ Screen::Size Screen::size() const {
           static_cast<std::size_t>(std::max(::getmaxy(stdscr), 1))};
 }
 
-void Screen::draw(const std::vector<Line> &lines) {
+void Screen::draw(const std::vector<std::string> &lines) {
   (void)::erase();
   const std::size_t room = std::min(lines.size(), size().lines);
   for (std::size_t i = 0; i < room; ++i) {
     (void)::move(static_cast<int>(i), 0);
-    for (const Span &span : lines[i]) {
-      (void)::attrset(static_cast<int>(attributes_of(span.tint, colour_) | (span.reversed ? A_REVERSE : A_NORMAL)));
-      (void)::addstr(span.text.c_str());  // fails at the last column of the last line, after having written it
+    (void)::attrset(A_NORMAL);
+    std::string_view rest = lines[i];
+    while (!rest.empty()) {
+      if (rest.starts_with("\033[")) {
+        const std::size_t end = std::min(rest.find('m'), rest.size() - 1);
+        (void)::attrset(static_cast<int>(attributes_of(rest.substr(2, end - 2))));
+        rest.remove_prefix(end + 1);
+      }
+      const std::size_t text = std::min(rest.find("\033["), rest.size());
+      // Fails at the last column of the last line, after having written it.
+      (void)::addnstr(rest.data(), static_cast<int>(text));
+      rest.remove_prefix(text);
     }
   }
   (void)::refresh();

@@ -1,16 +1,16 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A whole terminal by ncurses: lines with tints, keys, mouse, its size. The destructor restores the terminal, and so do
+// A whole terminal by ncurses: lines with tints, keys, its size. The destructor restores the terminal, and so do
 // handlers for crashes and catchable signals. One object at a time, on one thread.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "redag/base/time.hpp"
-#include "redag_lab/cli/terminal/styled.hpp"
 
 namespace redag::cli {
 
@@ -23,28 +23,21 @@ enum class Key : std::uint8_t {
   PageDown,
   Home,
   End,
+  Tab,
   Enter,
   Escape,
   Backspace,
-  Help,
-  Click,
-  WheelUp,
-  WheelDown,
-  Resize,
   Closed,  // the terminal is gone
 };
 
 struct KeyPress {
   Key key = Key::None;
-  char text = 0;           // Text: an ASCII character
-  std::size_t line = 0;    // Click
-  std::size_t column = 0;  // Click
+  char text = 0;  // Text: an ASCII character
 };
 
 class Screen {
  public:
-  /// Takes over standard input and standard output. Requires is_possible(). Without `colour`, tints are told apart by
-  /// weight only.
+  /// Takes over standard input and standard output. Requires is_possible().
   explicit Screen(bool colour);
   ~Screen();
   Screen(const Screen &) = delete;
@@ -59,14 +52,12 @@ class Screen {
   };
   [[nodiscard]] Size size() const;
 
-  /// Replaces the screen by the lines from the top, as many as fit. Sends the terminal what has changed.
-  void draw(const std::vector<Line> &lines);
+  /// Replaces the screen by the lines from the top, as many as fit, with the codes of tinted(). Sends the terminal what
+  /// has changed.
+  void draw(const std::vector<std::string> &lines);
 
-  /// Returns the next key, or None after `timeout` or a signal.
+  /// Returns the next key; None after `timeout` or a signal.
   [[nodiscard]] KeyPress wait(Duration timeout);
-
- private:
-  bool colour_;
 };
 
 }  // namespace redag::cli

@@ -27,25 +27,36 @@ void Attachment::attach(const live::Listed &listed) {
 }
 
 const live::Listed *Attachment::find(const std::vector<live::Listed> &pages) {
-  const live::Listed *found = nullptr;
-  const auto look_for = [&](const auto &is_it) {
-    if (found != nullptr) return;
-    const auto at = std::find_if(pages.begin(), pages.end(),
-                                 [&](const live::Listed &listed) { return listed.page && is_it(listed); });
-    if (at != pages.end()) found = &*at;
+  const auto first = [&](const auto &is_it) {
+    return std::find_if(pages.begin(), pages.end(),
+                        [&](const live::Listed &listed) { return listed.page && is_it(listed); });
   };
+  auto found = pages.end();
   if (known_) {
-    look_for([&](const live::Listed &l) { return l.path == known_->path && l.page->process == known_->process; });
-    look_for([&](const live::Listed &l) {
-      return l.page->frame.name == known_->name && l.page->frame.program == known_->program;
-    });
-  } else if (target_) {
-    look_for([&](const live::Listed &l) { return target_->names(l); });
-  } else if (std::count_if(pages.begin(), pages.end(), [](const auto &l) { return l.page.has_value(); }) == 1) {
-    look_for([](const live::Listed &) { return true; });
+    found = first([&](const auto &l) { return l.path == known_->path && l.page->process == known_->process; });
+    if (found == pages.end()) {
+      found = first([&](const auto &l) {
+        return l.page->frame.name == known_->name && l.page->frame.program == known_->program;
+      });
+    }
+  } else {
+    found = first([&](const auto &l) { return !target_ || target_->names(l); });
   }
-  if (found != nullptr) attach(*found);
-  return found;
+  if (found == pages.end()) return nullptr;
+  attach(*found);
+  return &*found;
+}
+
+void Attachment::step(const std::vector<live::Listed> &pages, bool forward) {
+  std::vector<const live::Listed *> readable;
+  std::size_t at = 0;
+  for (const live::Listed &listed : pages) {
+    if (!listed.page) continue;
+    if (known_ && listed.path == known_->path) at = readable.size();
+    readable.push_back(&listed);
+  }
+  if (readable.empty()) return;
+  attach(*readable[(at + (forward ? 1 : readable.size() - 1)) % readable.size()]);
 }
 
 }  // namespace redag::cli

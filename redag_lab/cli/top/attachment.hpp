@@ -28,15 +28,15 @@ struct LiveTarget {
 /// Remembers the watched executor, also across its restarts.
 class Attachment {
  public:
+  /// Without a target, the first readable executor is watched.
   explicit Attachment(std::optional<LiveTarget> target) : target_(target) {}
 
-  /// Returns the executor to show out of the running ones. Null means that it is gone (is_known()), or that there is
-  /// none or several to choose from. An executor that has ended is followed by the next one of the same name and
-  /// program.
+  /// Returns the watched executor out of the running ones; null: it is gone, or there is none yet. An executor that has
+  /// ended is followed by the next one of the same name and program.
   [[nodiscard]] const live::Listed *find(const std::vector<live::Listed> &pages);
-  void attach(const live::Listed &listed);
-  [[nodiscard]] bool is_known() const { return known_.has_value(); }
-  [[nodiscard]] bool has_target() const { return target_.has_value(); }
+
+  /// Watches the readable executor after the present one, or before it, around the list.
+  void step(const std::vector<live::Listed> &pages, bool forward);
 
  private:
   struct Known {
@@ -45,6 +45,8 @@ class Attachment {
     std::string name;
     std::string program;
   };
+  void attach(const live::Listed &listed);
+
   std::optional<LiveTarget> target_;
   std::optional<Known> known_;
 };

@@ -7,9 +7,11 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 #include "redag/base/text.hpp"
 #include "redag/base/words.hpp"
+#include "redag/live/rates.hpp"
 
 namespace redag::cli {
 namespace {
@@ -25,42 +27,43 @@ constexpr Duration kPatience = kSecond;
 
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
-const Figures &figures_of(const LiveRow &row, const Frame &frame) {
-  return row.is_dag ? frame.dags[row.index].figures : frame.tasks[row.index].figures;
+/// True if `text` contains `part`, whatever the case of ASCII letters.
+bool contains(const std::string &text, const std::string &part) {
+  const auto same = [](char a, char b) { return lower(a) == lower(b); };
+  return std::search(text.begin(), text.end(), part.begin(), part.end(), same) != text.end() || part.empty();
 }
 
-double key_of(const LiveRow &row, const Frame &frame, const LiveView &view) {
-  const Figures &figures = figures_of(row, frame);
-  const LiveResponse response = response_of(figures, view.since_start);
-  switch (view.order) {
-    case LiveOrder::Rate: return rate_of(figures, frame, view.since_start);
-    case LiveOrder::P99: return static_cast<double>(response.p99);
-    case LiveOrder::Longest: return static_cast<double>(response.longest);
+double key_of(const LiveRow &row, LiveOrder order) {
+  const Figures &figures = row.figures();
+  switch (order) {
+    case LiveOrder::Rate: return rate_of(figures, row.frame());
+    case LiveOrder::P99: return static_cast<double>(figures.recent_p99);
+    case LiveOrder::Longest: return static_cast<double>(figures.recent_max);
     // Recent misses outrank earlier ones.
     case LiveOrder::Misses:
       return static_cast<double>(figures.recent_misses) * 1e12 + static_cast<double>(figures.misses);
-    case LiveOrder::Cpu: return cpu_of(figures, frame, view.since_start);
+    case LiveOrder::Cpu: return cpu_of(figures, row.frame());
     case LiveOrder::Dag:
     case LiveOrder::Name: break;
   }
   return 0;
 }
 
-std::vector<LiveRow> by_dag(const Frame &frame, const LiveView &view) {
-  std::vector<LiveRow> rows;
-  for (std::size_t i = 0; i < frame.dags.size(); ++i) {
-    const std::size_t d = view.reversed ? frame.dags.size() - 1 - i : i;
-    const std::size_t at = rows.size();
-    for (std::size_t t = 0; t < frame.tasks.size(); ++t) {
-      if (frame.tasks[t].dag == d && contains(full_name(frame.tasks[t], frame), view.filter))
-        rows.push_back({false, t});
-    }
-    // A DAG is shown with any of its tasks.
-    if (rows.size() > at || contains(frame.dags[d].name, view.filter)) {
-      rows.insert(rows.begin() + static_cast<std::ptrdiff_t>(at), LiveRow{true, d});
-    }
+// The kernel's order of all tasks: by priority, and tasks without a priority of their own last; then by period.
+std::pair<int, Duration> urgency(const LiveRow &row) { return {-row.task->priority, row.task->period}; }
+
+/// Adds the tasks of a DAG that the filter shows, below the DAG if `with_dag`. A DAG is shown with any of its tasks.
+void add_dag(const live::Listed &executor, std::size_t index, const std::string &filter, bool with_dag,
+             std::vector<LiveRow> &rows) {
+  const Frame &frame = executor.page->frame;
+  const DagFrame &dag = frame.dags[index];
+  const std::size_t at = rows.size();
+  for (const TaskFrame &task : frame.tasks) {
+    if (task.dag == index && contains(full_name(task, frame), filter)) rows.push_back({&executor, &dag, &task});
   }
-  return rows;
+  if (with_dag && (rows.size() > at || contains(dag.name, filter))) {
+    rows.insert(rows.begin() + static_cast<std::ptrdiff_t>(at), LiveRow{&executor, &dag});
+  }
 }
 
 }  // namespace
@@ -70,39 +73,38 @@ const char *to_string(LiveOrder order) {
   return kNames[static_cast<std::size_t>(order)];
 }
 
-bool contains(const std::string &text, const std::string &part) {
-  const auto same = [](char a, char b) { return lower(a) == lower(b); };
-  return std::search(text.begin(), text.end(), part.begin(), part.end(), same) != text.end() || part.empty();
-}
-
 std::string full_name(const TaskFrame &task, const Frame &frame) {
   const std::string &dag = frame.dags[task.dag].name;
   return dag.empty() ? task.name : dag + "." + task.name;
 }
 
-std::string full_name(const LiveRow &row, const Frame &frame) {
-  return row.is_dag ? frame.dags[row.index].name : full_name(frame.tasks[row.index], frame);
-}
+std::string LiveRow::name() const { return task != nullptr ? full_name(*task, frame()) : dag->name; }
 
-std::vector<LiveRow> rows_of(const Frame &frame, const LiveView &view) {
-  if (view.order == LiveOrder::Dag && !view.dags_only) return by_dag(frame, view);
+std::vector<LiveRow> rows_of(std::span<const live::Listed> pages, const LiveView &view) {
+  const bool by_dag = view.order == LiveOrder::Dag && !view.dags_only && !view.all;
   std::vector<LiveRow> rows;
-  const std::size_t count = view.dags_only ? frame.dags.size() : frame.tasks.size();
-  for (std::size_t i = 0; i < count; ++i) {
-    const LiveRow row{view.dags_only, i};
-    if (contains(full_name(row, frame), view.filter)) rows.push_back(row);
+  for (const live::Listed &listed : pages) {
+    if (!listed.page) continue;
+    const std::vector<DagFrame> &dags = listed.page->frame.dags;
+    // Of all executors, one can be meant by its name.
+    const std::string filter = view.all && contains(listed.page->frame.name, view.filter) ? "" : view.filter;
+    for (std::size_t i = 0; i < dags.size(); ++i) {
+      const std::size_t d = by_dag && view.reversed ? dags.size() - 1 - i : i;
+      if (!view.dags_only || view.all) {
+        add_dag(listed, d, filter, by_dag, rows);
+      } else if (contains(dags[d].name, view.filter)) {
+        rows.push_back({&listed, &dags[d]});
+      }
+    }
   }
+  if (by_dag) return rows;
   std::stable_sort(rows.begin(), rows.end(), [&](const LiveRow &a, const LiveRow &b) {
-    if (view.order == LiveOrder::Name) return full_name(a, frame) < full_name(b, frame);
-    return key_of(a, frame, view) > key_of(b, frame, view);
+    if (view.order == LiveOrder::Name) return a.name() < b.name();
+    if (view.order == LiveOrder::Dag && view.all) return urgency(a) < urgency(b);
+    return key_of(a, view.order) > key_of(b, view.order);
   });
   if (view.reversed) std::reverse(rows.begin(), rows.end());
   return rows;
-}
-
-LiveResponse response_of(const Figures &figures, bool since_start) {
-  if (since_start) return {figures.response_p50, figures.response_p99, figures.response_max};
-  return {figures.recent_p50, figures.recent_p99, figures.recent_max};
 }
 
 Figures total_of(const Frame &frame) {
@@ -110,7 +112,6 @@ Figures total_of(const Frame &frame) {
   for (const DagFrame &dag : frame.dags) {
     total.released += dag.figures.released;
     total.finished += dag.figures.finished;
-    total.skipped += dag.figures.skipped;
     total.misses += dag.figures.misses;
     total.cpu += dag.figures.cpu;
     total.recent_jobs += dag.figures.recent_jobs;
@@ -127,13 +128,6 @@ std::string misses_in_words(const Figures &total, Duration window) {
                      format_count(total.recent_misses), humanize_duration(window));
 }
 
-std::string kinds_of_misses(const Figures &total) {
-  std::vector<std::string> kinds;
-  if (total.skipped > 0) kinds.push_back(format_count(total.skipped) + " skipped");
-  if (total.misses > total.skipped) kinds.push_back(format_count(total.misses - total.skipped) + " late or aborted");
-  return join(kinds);
-}
-
 std::string hint_on_misses(const Frame &frame) {
   constexpr double kBusy = 0.95;
   const auto worst = std::max_element(frame.dags.begin(), frame.dags.end(), [](const DagFrame &a, const DagFrame &b) {
@@ -142,7 +136,7 @@ std::string hint_on_misses(const Frame &frame) {
   if (worst == frame.dags.end() || worst->figures.recent_misses == 0) return {};
   std::string text = "most misses lately: " + worst->name;
   if (worst->max_active > 0 && worst->figures.active >= worst->max_active) text += ", at its max_active";
-  const double busy = frame.workers > 0 ? cpu_of(total_of(frame), frame, false) / frame.workers : 0;
+  const double busy = frame.workers > 0 ? cpu_of(total_of(frame), frame) / frame.workers : 0;
   if (busy >= kBusy) text += fmt::format(", workers busy {}", format_percent(busy));
   return text + "; redag why explains a recorded run";
 }

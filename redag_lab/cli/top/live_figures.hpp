@@ -7,11 +7,11 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "redag/live/frame.hpp"
-#include "redag/live/rates.hpp"
+#include "redag/live/reader.hpp"
 #include "redag_analysis/text/tint.hpp"
 
 namespace redag::cli {
@@ -21,45 +21,37 @@ inline constexpr std::size_t kLiveOrders = 7;
 [[nodiscard]] const char *to_string(LiveOrder order);
 
 struct LiveView {
-  LiveOrder order = LiveOrder::Dag;  // Dag: each DAG with its tasks below it; otherwise tasks, the largest first
+  bool all = false;                  // the tasks of all executors
+  LiveOrder order = LiveOrder::Dag;  // Dag: each DAG with its tasks below it, or of all executors the most urgent task
+                                     // first; otherwise tasks, the largest first
   bool reversed = false;
-  bool dags_only = false;    // the rows of DAGs, in the order of `order`
-  bool since_start = false;  // response times and rates of the whole run instead of the recent ones
-  std::string filter = {};   // part of the names to show, in any case; empty: all
+  bool dags_only = false;   // the rows of DAGs, in the order of `order`
+  std::string filter = {};  // part of the names to show, in any case; empty: all
 };
 
-/// A DAG or a task of a frame.
+/// A DAG or a task of an executor's page.
 struct LiveRow {
-  bool is_dag = false;
-  std::size_t index = 0;  // among the frame's DAGs or tasks
+  const live::Listed *executor;
+  const live::DagFrame *dag;
+  const live::TaskFrame *task = nullptr;  // null: the row is the DAG's
 
-  friend bool operator==(const LiveRow &, const LiveRow &) = default;
+  [[nodiscard]] const live::Frame &frame() const { return executor->page->frame; }
+  [[nodiscard]] const live::page::Figures &figures() const { return task != nullptr ? task->figures : dag->figures; }
+  /// Returns "dag.task" for a task.
+  [[nodiscard]] std::string name() const;
 };
 
-/// Returns the rows that `view` shows, in their order.
-[[nodiscard]] std::vector<LiveRow> rows_of(const live::Frame &frame, const LiveView &view);
+/// Returns the rows of readable pages that `view` shows, in their order. They point into `pages`.
+[[nodiscard]] std::vector<LiveRow> rows_of(std::span<const live::Listed> pages, const LiveView &view);
 
-/// Returns "dag.task" for a task.
+/// Returns "dag.task".
 [[nodiscard]] std::string full_name(const live::TaskFrame &task, const live::Frame &frame);
-[[nodiscard]] std::string full_name(const LiveRow &row, const live::Frame &frame);
 
-/// True if `text` contains `part`, whatever the case of ASCII letters.
-[[nodiscard]] bool contains(const std::string &text, const std::string &part);
-
-struct LiveResponse {
-  Duration p50 = 0;
-  Duration p99 = 0;
-  Duration longest = 0;
-};
-[[nodiscard]] LiveResponse response_of(const live::page::Figures &figures, bool since_start);
-
-/// Returns the released, finished and skipped jobs and misses, also the recent ones, and the jobs away, of all DAGs.
+/// Returns the released and finished jobs, misses, processor time, and the jobs away, of all DAGs.
 [[nodiscard]] live::page::Figures total_of(const live::Frame &frame);
 
 /// Returns "missed 12 of 2 000 jobs, 3 in the last 5s", in the words of docs/model.md.
 [[nodiscard]] std::string misses_in_words(const live::page::Figures &total, Duration window);
-/// Returns "9 skipped and 3 late or aborted"; a live page does not tell late jobs from aborted ones. Empty: no misses.
-[[nodiscard]] std::string kinds_of_misses(const live::page::Figures &total);
 /// Returns what the figures tell about recent misses, and what tells more. Empty: there are none.
 [[nodiscard]] std::string hint_on_misses(const live::Frame &frame);
 

@@ -3,23 +3,39 @@
 
 #include "redag_lab/cli/top/live_figures.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "redag_lab/cli/top/attachment.hpp"
 #include "redag_lab/cli/top/frame_for_tests.hpp"
-#include "redag_lab/cli/top/live_graphs.hpp"
 #include "redag_lab/cli/top/live_json.hpp"
 
 namespace redag::cli {
 namespace {
 
+using ::testing::ElementsAre;
 using testing::small_page;
 using Names = std::vector<std::string>;
 
 Names names_of(const live::Listed &listed, const LiveView &view) {
   Names names;
-  for (const LiveRow &row : rows_of(listed.page->frame, view)) names.push_back(full_name(row, listed.page->frame));
+  for (const LiveRow &row : rows_of(std::span(&listed, 1), view)) names.push_back(row.name());
   return names;
+}
+
+/// Two executors that share an order, one whose page is damaged, and one without priorities.
+std::vector<live::Listed> machine() {
+  std::vector<live::Listed> pages{small_page(12, "cart"), small_page(13, "arm"),
+                                  live::Listed{"/x/redag.14.0", 14, 0, make_error("damaged")}, small_page(15, "plain")};
+  pages[0].page->frame.tasks[0].priority = 80;
+  pages[0].page->frame.tasks[1].priority = 80;
+  pages[0].page->frame.tasks[2].priority = 77;
+  pages[1].page->frame.tasks[0].period = 20 * kMillisecond;
+  pages[1].page->frame.tasks[0].priority = 79;
+  pages[1].page->frame.tasks[1].period = 50 * kMillisecond;
+  pages[1].page->frame.tasks[1].priority = 78;
+  pages[1].page->frame.tasks[2].priority = 77;
+  return pages;
 }
 
 TEST(LiveRows, Orders) {
@@ -59,6 +75,21 @@ TEST(LiveRows, AFilterKeepsTheDagsOfItsTasks) {
   EXPECT_EQ(names_of(listed, {.filter = "x"}), Names{});
 }
 
+TEST(LiveRows, OfAllExecutorsFollowTheKernelsOrder) {
+  const std::vector<live::Listed> pages = machine();
+  const auto names = [&](const LiveView &view) {
+    Names found;
+    for (const LiveRow &row : rows_of(pages, view)) found.push_back(row.frame().name + ":" + row.task->name);
+    return found;
+  };
+  EXPECT_THAT(names({.all = true}), ElementsAre("cart:sense", "cart:act", "arm:sense", "arm:act", "cart:plan",
+                                                "arm:plan", "plain:sense", "plain:act", "plain:plan"));
+  EXPECT_THAT(names({.all = true, .filter = "PLAN"}), ElementsAre("cart:plan", "arm:plan", "plain:plan"));
+  EXPECT_THAT(names({.all = true, .reversed = true, .filter = "arm"}), ElementsAre("arm:plan", "arm:act", "arm:sense"));
+  EXPECT_THAT(names({.all = true, .order = LiveOrder::Rate, .filter = "act"}),
+              ElementsAre("cart:act", "arm:act", "plain:act"));
+}
+
 TEST(LiveFigures, Tints) {
   EXPECT_EQ(response_tint(5, 0, 0), Tint::Plain);
   EXPECT_EQ(response_tint(89, 100, 0), Tint::Plain);
@@ -90,13 +121,11 @@ TEST(LiveFigures, MissesAreOfReleasedJobs) {
   live::page::Figures &fast = frame.dags[0].figures;
   fast.released = 11'808;
   fast.finished = 2'869;
-  fast.skipped = 8'900;
   fast.misses = 8'939;
   fast.recent_misses = 12;
   fast.active = 0;
   const live::page::Figures total = total_of(frame);
   EXPECT_EQ(misses_in_words(total, frame.window), "missed 8 939 of 11 808 jobs, 12 in the last 2s");
-  EXPECT_EQ(kinds_of_misses(total), "8 900 skipped and 39 late or aborted");
   EXPECT_EQ(hint_on_misses(frame), "most misses lately: fast; redag why explains a recorded run");
   fast.active = 1;
   fast.recent_cpu = 3'700 * kMillisecond;  // of 2 s on two workers, with the 300 ms of the other DAG
@@ -136,60 +165,15 @@ TEST(LiveJson, HasWhatIsShown) {
   EXPECT_EQ(document["threads"][1]["task"], nullptr);
 }
 
-TEST(LiveGraphs, AHistogramSharesItsAxis) {
-  live::Frame frame = small_page().page->frame;
-  EXPECT_TRUE(axis_of(frame).is_empty());
-  EXPECT_EQ(plain(histogram(frame.tasks[0].spread.all, axis_of(frame), 0, 5, {})), "");
-  frame.tasks[0].spread.all[10] = 4;  // from 32.8 us
-  frame.tasks[0].spread.all[12] = 8;
-  frame.tasks[1].spread.all[13] = 1;  // from 98.3 us
-  const TimeAxis axis = axis_of(frame);
-  EXPECT_EQ(axis.first, 10U);
-  EXPECT_EQ(axis.last, 14U);
-  EXPECT_EQ(plain(histogram(frame.tasks[0].spread.all, axis, 0, 4, {})), "\u2584 \u2588");
-  EXPECT_EQ(plain(histogram(frame.tasks[0].spread.all, axis, 0, 2, {})), "\u2584\u2588");
-  EXPECT_EQ(plain(histogram(frame.tasks[0].spread.all, axis, 0, 8, {})), "\u2584\u2584  \u2588\u2588");
-  EXPECT_EQ(plain(histogram(frame.tasks[1].spread.all, axis, 0, 4, {.ascii = true})), "   #");
-  const Line late = histogram(frame.tasks[0].spread.all, axis, 60 * kMicrosecond, 4, {});
-  ASSERT_EQ(late.size(), 3U);
-  EXPECT_EQ(late[0].text, "\u2584 ");
-  EXPECT_EQ(late[0].tint, Tint::Plain);
-  EXPECT_EQ(late[1].text, "\u2588");
-  EXPECT_EQ(late[1].tint, Tint::Bad);
-  EXPECT_EQ(late[2].tint, Tint::Plain);  // a blank beyond the deadline
-  EXPECT_EQ(axis_text(axis, 16), "33us       130us");
-  EXPECT_EQ(axis_text(axis, 8), "33us    ");
-}
-
-TEST(LiveGraphs, ABarIsAsLongAsItsShare) {
-  EXPECT_EQ(plain(share_bar(0.5, 20, {.ascii = true})), "[|||||       50.0 %]");
-  EXPECT_EQ(plain(share_bar(0, 20, {.ascii = true})), "[             0.0 %]");
-  EXPECT_EQ(plain(share_bar(7, 20, {.ascii = true})), "[|||||||||| 700.0 %]");
-  EXPECT_EQ(share_bar(0.95, 20, {})[1].tint, Tint::Bad);
-}
-
-TEST(LiveGraphs, ACourseRemembersRowsThatAreThere) {
-  live::Frame frame = small_page().page->frame;
-  Course course;
-  const auto graph = [&](std::size_t width) {
-    std::string text;
-    for (const Span &span : course.graph("fast.sense", 8, width, {.ascii = true})) text += span.text;
-    return text;
-  };
-  EXPECT_EQ(graph(3), "   ");
-  for (const Duration p99 : {1, 4, 8, 16}) {
-    ++frame.sequence;
-    frame.tasks[0].figures.recent_p99 = p99;
-    course.add(frame);
-    course.add(frame);  // the same look
-  }
-  EXPECT_EQ(graph(6), "  ..-#") << "of 16, the largest";
-  EXPECT_EQ(graph(2), "-#");
-  EXPECT_EQ(course.graph("fast.sense", 8, 2, {}).back().tint, Tint::Bad);
-  frame.tasks.erase(frame.tasks.begin());
-  ++frame.sequence;
-  course.add(frame);
-  EXPECT_EQ(graph(3), "   ");
+TEST(LiveJson, OfAllExecutorsIsADocument) {
+  const Json document = machine_json(machine(), {.all = true});
+  EXPECT_EQ(document["format"], "redag.live-all/1");
+  ASSERT_EQ(document["tasks"].size(), 9U);
+  EXPECT_EQ(document["tasks"][2]["pid"], 13);
+  EXPECT_EQ(document["tasks"][2]["executor"], "arm");
+  EXPECT_EQ(document["tasks"][2]["name"], "sense");
+  EXPECT_EQ(document["tasks"][2]["priority"], 79);
+  EXPECT_TRUE(document["tasks"][8]["priority"].is_null());
 }
 
 TEST(Target, IsAProcessOrOneOfItsExecutors) {
@@ -199,16 +183,29 @@ TEST(Target, IsAProcessOrOneOfItsExecutors) {
   for (const char *bad : {"", "x", "0", "-1", "12.", "12.x", "12.3.4", "12x"}) EXPECT_FALSE(parse_target(bad)) << bad;
 }
 
-TEST(Attachment, TheOnlyOneIsTaken) {
+TEST(Attachment, WithoutATargetTheFirstReadableOneIsTaken) {
   Attachment attachment(std::nullopt);
   EXPECT_EQ(attachment.find({}), nullptr);
-  EXPECT_FALSE(attachment.is_known());
-  const std::vector<live::Listed> two{small_page(12), small_page(13)};
-  EXPECT_EQ(attachment.find(two), nullptr);
-  EXPECT_FALSE(attachment.is_known());
-  const std::vector<live::Listed> one{small_page(13)};
-  EXPECT_EQ(attachment.find(one), &one[0]);
-  EXPECT_EQ(attachment.find(two), &two[1]);
+  std::vector<live::Listed> pages{small_page(11), small_page(12, "arm"), small_page(13)};
+  pages[0].page = make_error("no");
+  EXPECT_EQ(attachment.find(pages), &pages[1]);
+}
+
+TEST(Attachment, StepsAroundTheReadableOnes) {
+  Attachment attachment(LiveTarget{12, std::nullopt});
+  std::vector<live::Listed> pages{small_page(11), small_page(12, "arm"), small_page(13), small_page(14)};
+  pages[2].page = make_error("no");
+  EXPECT_EQ(attachment.find(pages), &pages[1]);
+  for (const std::size_t next : {3U, 0U, 1U}) {
+    attachment.step(pages, true);
+    EXPECT_EQ(attachment.find(pages), &pages[next]);
+  }
+  for (const std::size_t previous : {0U, 3U, 1U}) {
+    attachment.step(pages, false);
+    EXPECT_EQ(attachment.find(pages), &pages[previous]);
+  }
+  attachment.step({}, true);
+  EXPECT_EQ(attachment.find(pages), &pages[1]);
 }
 
 TEST(Attachment, FollowsARestart) {
@@ -217,7 +214,6 @@ TEST(Attachment, FollowsARestart) {
   EXPECT_EQ(attachment.find(before), &before[1]);
   const std::vector<live::Listed> other{small_page(14, "arm")};
   EXPECT_EQ(attachment.find(other), nullptr);
-  EXPECT_TRUE(attachment.is_known());
   const std::vector<live::Listed> after{small_page(14, "arm"), small_page(15)};
   EXPECT_EQ(attachment.find(after), &after[1]);
   // The number is reused by another process, and therefore by another executor.

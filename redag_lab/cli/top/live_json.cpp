@@ -5,8 +5,7 @@
 
 #include <algorithm>
 
-#include "redag_lab/cli/top/live_figures.hpp"
-#include "redag_lab/cli/top/machine_table.hpp"
+#include "redag/live/rates.hpp"
 
 namespace redag::cli {
 namespace {
@@ -14,8 +13,8 @@ namespace {
 Json or_null(Duration value) { return value > 0 ? Json(value) : Json(nullptr); }
 
 Json figures_json(const live::page::Figures &f, const live::Frame &frame) {
-  return {{"rate", rate_of(f, frame, false)},
-          {"cpu", cpu_of(f, frame, false)},
+  return {{"rate", rate_of(f, frame)},
+          {"cpu", cpu_of(f, frame)},
           {"released", f.released},
           {"finished", f.finished},
           {"skipped", f.skipped},
@@ -58,8 +57,8 @@ Json device_json(const live::DeviceFrame &device, const live::Frame &frame) {
           {"used", device.used},
           {"queued", device.queued},
           {"tasks", std::move(tasks)},
-          {"busy", share_of(device, frame, false)},
-          {"rate", rate_of(device, frame, false)},
+          {"busy", share_of(device, frame)},
+          {"rate", rate_of(device, frame)},
           {"served", device.served},
           {"busy_ns", device.busy},
           {"recent", {{"served", device.recent_served}, {"busy_ns", device.recent_busy}}}};
@@ -107,7 +106,7 @@ Json to_json(const live::Listed &listed, const live::Page &page, Time now) {
   for (const live::ThreadFrame &thread : frame.threads) {
     document["threads"].push_back(
         {{"index", thread.index},
-         {"cpu", share_of(thread, frame, false)},
+         {"cpu", share_of(thread, frame)},
          {"cpu_ns", thread.used},
          {"task", thread.task ? Json(full_name(frame.tasks[*thread.task], frame)) : Json(nullptr)}});
   }
@@ -144,11 +143,9 @@ Json to_json(const std::vector<live::Listed> &pages, Time now) {
 
 Json machine_json(const std::vector<live::Listed> &pages, const LiveView &view) {
   Json tasks = Json::array();
-  for (const MachineRow &row : machine_rows(pages, view)) {
-    const live::Listed &listed = pages[row.page];
-    const live::Frame &frame = listed.page->frame;
-    Json task = {{"pid", listed.pid}, {"number", listed.number}, {"executor", frame.name}};
-    task.update(task_json(frame.tasks[row.task], frame));
+  for (const LiveRow &row : rows_of(pages, view)) {
+    Json task = {{"pid", row.executor->pid}, {"number", row.executor->number}, {"executor", row.frame().name}};
+    task.update(task_json(*row.task, row.frame()));
     tasks.push_back(std::move(task));
   }
   return {{"format", "redag.live-all/1"}, {"tasks", std::move(tasks)}};

@@ -16,7 +16,7 @@ namespace redag::cli {
 [[nodiscard]] Json to_json(const live::Listed &listed, const live::Page &page, Time now);
 /// Returns "redag.live-list/1".
 [[nodiscard]] Json to_json(const std::vector<live::Listed> &pages, Time now);
-/// Returns "redag.live-all/1": the rows of machine_text().
+/// Returns "redag.live-all/1": the rows of all executors. Requires `view.all`.
 [[nodiscard]] Json machine_json(const std::vector<live::Listed> &pages, const LiveView &view);
 
 }  // namespace redag::cli

@@ -1,38 +1,30 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The rows of a frame as a table that fits the terminal. Names are cut last: columns of figures are left out first, the
-// least important ones before others. Pure function.
+// The tables of `redag top`. Pure functions.
 #pragma once
 
 #include <cstddef>
-#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "redag_lab/cli/terminal/styled.hpp"
+#include "redag/live/reader.hpp"
+#include "redag_analysis/text/table.hpp"
 #include "redag_lab/cli/top/live_figures.hpp"
-#include "redag_lab/cli/top/live_graphs.hpp"
 
 namespace redag::cli {
 
-/// The place of a column's title, [begin, end), and the order that a click on it chooses.
-struct TitlePlace {
-  std::size_t begin = 0;
-  std::size_t end = 0;
-  std::optional<LiveOrder> order;
-};
+/// Returns "1234", or "1234.1" for a second executor of a process.
+[[nodiscard]] std::string id_of(const live::Listed &listed);
 
-struct LiveTable {
-  Line titles;
-  std::vector<TitlePlace> places;
-  std::vector<LiveRow> rows;
-  std::vector<Line> lines;          // one for each row
-  std::vector<std::string> hidden;  // titles of columns for which there is no room
-};
+/// Returns the rows of the pages that `view` shows, with their executors if it shows all.
+[[nodiscard]] Table task_table(std::span<const live::Listed> pages, const LiveView &view);
 
-/// `width` is in columns; 0: no limit. Without `course` there is no column of it.
-[[nodiscard]] LiveTable make_table(const live::Frame &frame, const LiveView &view, const Course *course,
-                                   std::size_t width, const Glyphs &glyphs);
+/// Returns the first `most` devices of an executor.
+[[nodiscard]] Table device_table(const live::Frame &frame, std::size_t most);
+
+/// Returns one row per executor.
+[[nodiscard]] Table executor_table(const std::vector<live::Listed> &pages, Time now);
 
 }  // namespace redag::cli

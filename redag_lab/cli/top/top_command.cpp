@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <optional>
 
@@ -13,10 +14,10 @@
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/options.hpp"
 #include "redag_lab/cli/terminal/screen.hpp"
+#include "redag_lab/cli/terminal/signals.hpp"
 #include "redag_lab/cli/top/attachment.hpp"
 #include "redag_lab/cli/top/live_json.hpp"
-#include "redag_lab/cli/top/machine_table.hpp"
-#include "redag_lab/cli/top/top_loop.hpp"
+#include "redag_lab/cli/top/live_table.hpp"
 #include "redag_lab/cli/top/top_screen.hpp"
 
 namespace redag::cli {
@@ -27,10 +28,8 @@ struct TopArguments {
   std::string folder = live::kFolder;
   Duration interval = kSecond;
   bool list = false;
-  bool all = false;
   bool once = false;
   bool json = false;
-  bool ascii = false;
   LiveView view;
 };
 
@@ -43,7 +42,8 @@ int list(const TopArguments &options, Console &console) {
   if (options.json) {
     console.print(to_text(to_json(pages, now)));
   } else if (!pages.empty()) {
-    console.print(list_text(pages, console.out_traits(), now));
+    const StreamTraits &out = console.out_traits();
+    console.print(executor_table(pages, now).render(out.width, out.colour));
   }
   if (!pages.empty()) return kExitOk;
   console.note("no running executor publishes a live page\n");
@@ -68,7 +68,8 @@ int show_once(const TopArguments &options, const std::optional<LiveTarget> &targ
     if (readable > 0) std::erase_if(pages, [](const live::Listed &listed) { return !listed.page; });
   }
   if (pages.size() > 1) {
-    console.note(list_text(pages, console.err_traits(), now));
+    const StreamTraits &err = console.err_traits();
+    console.note(executor_table(pages, now).render(err.width, err.colour));
     console.error("several executors are running: name one", fmt::format("redag top {}", pages.front().pid));
     return kExitBad;
   }
@@ -77,32 +78,19 @@ int show_once(const TopArguments &options, const std::optional<LiveTarget> &targ
     console.note(listed.page.error());
     return kExitBad;
   }
-  if (options.json) {
-    console.print(to_text(to_json(listed, *listed.page, now)));
-    return kExitOk;
-  }
   const StreamTraits &out = console.out_traits();
-  for (const Line &line : draw_once(listed, options.view, now, out.width, Glyphs{options.ascii})) {
-    console.print(with_codes(line, out.colour) + "\n");
-  }
+  console.print(options.json ? to_text(to_json(listed, *listed.page, now))
+                             : draw_once(listed, options.view, now, out.width, out.colour));
   return kExitOk;
 }
 
 int show_all(const TopArguments &options, Console &console) {
-  const StreamTraits &out = console.out_traits();
-  if (!options.once && !options.json && Screen::is_possible()) {
-    return watch_machine({.folder = options.folder,
-                          .interval = options.interval,
-                          .target = std::nullopt,
-                          .view = options.view,
-                          .glyphs = Glyphs{options.ascii},
-                          .colour = out.colour});
-  }
   const std::vector<live::Listed> pages = live::list_pages(options.folder);
+  const StreamTraits &out = console.out_traits();
   if (options.json) {
     console.print(to_text(machine_json(pages, options.view)));
   } else if (!pages.empty()) {
-    console.print(machine_text(pages, options.view, out.width, out.colour));
+    console.print(task_table(pages, options.view).render(out.width, out.colour));
   }
   for (const live::Listed &listed : pages) {
     if (!listed.page) console.note(listed.page.error());
@@ -111,6 +99,59 @@ int show_all(const TopArguments &options, Console &console) {
   console.error("no running executor publishes a live page", kHowTo);
   return kExitNo;
 }
+
+/// The screen, until the user quits. One thread.
+class Top {
+ public:
+  Top(const TopArguments &options, std::optional<LiveTarget> target) : options_(options), attachment_(target) {
+    state_.view = options.view;
+  }
+
+  int run(bool colour) {
+    const InterruptGuard guard;
+    Screen screen(colour);
+    look();
+    if (pages_.size() > 1 && options_.target.empty() && !options_.view.all) state_.mode = TopMode::List;
+    while (!InterruptGuard::interrupted()) {
+      const Screen::Size size = screen.size();
+      const TopInput input{.pages = pages_, .shown = shown_ ? &*shown_ : nullptr, .is_gone = is_gone_, .now = now_};
+      screen.draw(draw_top(state_, input, size.columns, size.lines, colour));
+      const Duration left = next_look_ - runtime::monotonic_now();
+      const TopAction action = press(screen.wait(std::max<Duration>(left, 0)), state_);
+      if (action == TopAction::Quit) break;
+      if (action != TopAction::None) {
+        attachment_.step(pages_, action == TopAction::Next);
+        show();
+      }
+      if (runtime::monotonic_now() >= next_look_) look();
+    }
+    return kExitOk;
+  }
+
+ private:
+  void look() {
+    next_look_ = runtime::monotonic_now() + options_.interval;
+    if (state_.paused) return;
+    now_ = runtime::monotonic_now();
+    pages_ = live::list_pages(options_.folder);
+    show();
+  }
+
+  void show() {
+    const live::Listed *const found = attachment_.find(pages_);
+    is_gone_ = found == nullptr;
+    if (found != nullptr) shown_ = *found;
+  }
+
+  const TopArguments &options_;
+  TopState state_;
+  Attachment attachment_;
+  std::vector<live::Listed> pages_;
+  std::optional<live::Listed> shown_;  // the latest page read of the watched executor
+  bool is_gone_ = false;
+  Time now_ = 0;
+  Time next_look_ = 0;
+};
 
 int top(const TopArguments &options, Console &console) {
   std::optional<LiveTarget> target;
@@ -123,18 +164,14 @@ int top(const TopArguments &options, Console &console) {
     }
   }
   if (options.list) return list(options, console);
-  if (options.all) return show_all(options, console);
-  if (options.once || options.json) return show_once(options, target, console);
-  if (!Screen::is_possible()) {
-    console.note("the output is not a terminal that can be drawn on: one frame is printed, as with --once\n");
-    return show_once(options, target, console);
+  const bool is_possible = Screen::is_possible();
+  if (!is_possible || options.once || options.json) {
+    if (!is_possible && !options.once && !options.json) {
+      console.note("the output is not a terminal that can be drawn on: one frame is printed, as with --once\n");
+    }
+    return options.view.all ? show_all(options, console) : show_once(options, target, console);
   }
-  return run_top(TopOptions{.folder = options.folder,
-                            .interval = options.interval,
-                            .target = target,
-                            .view = options.view,
-                            .glyphs = Glyphs{options.ascii},
-                            .colour = console.out_traits().colour});
+  return Top(options, target).run(console.out_traits().colour);
 }
 
 constexpr std::array kSortOrders{LiveOrder::Dag,     LiveOrder::Name,   LiveOrder::Rate, LiveOrder::P99,
@@ -148,19 +185,16 @@ Action add_top(CLI::App &app) {
   CLI::Option *target = app.add_option("PID", options->target,
                                        "Process ID; by default the only running executor, or a list to choose from");
   CLI::Option *list = app.add_flag("--list", options->list, "List the running executors")->excludes(target);
-  CLI::Option *all =
-      app.add_flag("--all", options->all, "Show the tasks of all executors in one table, most urgent first")
-          ->excludes(target)
-          ->excludes(list);
+  CLI::Option *all = app.add_flag("--all", view.all, "Show the tasks of all executors in one table, most urgent first")
+                         ->excludes(target)
+                         ->excludes(list);
   app.add_flag("--once", options->once, "Print one frame as text and exit")->excludes(list);
   app.add_flag("--json", options->json, "Print one frame (or the list) as a JSON document and exit");
   add_duration(app, "--interval", options->interval, "Time between two updates");
-  add_choice(app, "--sort", view.order, choices_of(kSortOrders), "Order of the rows")->excludes(all);
+  add_choice(app, "--sort", view.order, choices_of(kSortOrders), "Order of the rows");
   app.add_flag("--reverse", view.reversed, "Reverse the order");
   app.add_option("--filter", view.filter, "Show only DAGs and tasks whose name contains this")->type_name("TEXT");
   app.add_flag("--dags", view.dags_only, "Show only DAGs, not their tasks")->excludes(all);
-  app.add_flag("--since-start", view.since_start, "Show figures since the start instead of over the last seconds");
-  app.add_flag("--ascii", options->ascii, "Draw graphs with ASCII characters");
   add_pages_folder(app, options->folder);
   return [options](Console &console) { return top(*options, console); };
 }
