@@ -6,7 +6,7 @@
 //     example_07_record results/robot
 //     redag report results/robot
 //     redag why results/robot
-//     redag check-trace results/robot
+//     redag events results/robot --check
 //
 // If the program is killed meanwhile, they read what it had recorded.
 #include <cstdio>

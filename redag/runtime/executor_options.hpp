@@ -80,7 +80,7 @@ struct ExecutorOptions {
   /// it runs, up to 1,024 further misses wait, and more are only counted. An exception stops the executor as that of a
   /// body does, and wait() throws it. Empty: no such thread.
   std::function<void(const MissInfo &)> on_deadline_miss{};
-  /// Folder where the run is recorded, for `redag report`, `check-trace`, `why` and `diff`; empty: none. Created if it
+  /// Folder where the run is recorded, for `redag report`, `events`, `why` and `compare`; empty: none. Created if it
   /// is missing. A thread of normal priority writes events to DIR/events.redag while the run lasts, which replaces that
   /// of an earlier run. After a crash, the file has all but the last tenth of a second.
   std::string record{};

@@ -109,7 +109,7 @@ Result<Trace> read_all(Result<EventsReader> reader, const std::string &file) {
     if (!*more) return trace;
     if (trace.events.size() + events.size() > kMostEventsInMemory) {
       return file_error(file, 0, "has more than " + std::to_string(kMostEventsInMemory) + " events",
-                        "'redag check-trace' and 'redag events' read files of any length");
+                        "'redag events' reads files of any length");
     }
     trace.events.insert(trace.events.end(), events.begin(), events.end());
   }

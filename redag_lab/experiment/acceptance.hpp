@@ -29,23 +29,11 @@ struct SimulationEffort {
   friend bool operator==(const SimulationEffort &, const SimulationEffort &) = default;
 };
 
-/// A run with a miss, for `redag simulate` to repeat with this duration and seed.
-struct SeenMiss {
-  Workload workload;
-  Duration duration = 0;
-  std::uint64_t seed = 0;
-};
-
-/// Searches for a miss; every job executes for its wcet. A miss is a response above the deadline, a DAG's instance
-/// above its end-to-end deadline, or a skipped job. `task_set` is `workload` compiled on the platform that it states.
-[[nodiscard]] std::optional<SeenMiss> find_miss(const Workload &workload, const analysis::TaskSet &task_set,
-                                                const SimulationEffort &effort, std::uint64_t seed);
-
-enum class DeadlineKind : std::uint8_t {
-  Implicit,     // D = T
-  Constrained,  // D / T uniform in [0.5, 1], never below C
-};
-[[nodiscard]] const char *to_string(DeadlineKind value);
+/// True if some run misses a deadline; every job executes for its wcet. A miss is a response above the deadline, a
+/// DAG's instance above its end-to-end deadline, or a skipped job. `task_set` is `workload` compiled on the platform
+/// that it states.
+[[nodiscard]] bool sees_miss(const Workload &workload, const analysis::TaskSet &task_set,
+                             const SimulationEffort &effort, std::uint64_t seed);
 
 /// Methods besides those of analysis::methods().
 inline constexpr std::string_view kAnyMethod = "any";                // analysis::analyze(): all sound methods together
@@ -59,7 +47,6 @@ struct AcceptancePlan {
   std::vector<std::uint32_t> utilization;
   std::vector<std::uint32_t> dags = {10};
   std::vector<std::uint32_t> workers = {4};
-  std::vector<DeadlineKind> deadlines = {DeadlineKind::Implicit};
   std::vector<PreemptionMode> preemption = {PreemptionMode::None, PreemptionMode::Os};
   std::vector<std::string> methods = {std::string(kAnyMethod), std::string(kSimulationMethod)};
   /// Common to all points; a point's own values replace these.
@@ -72,7 +59,7 @@ struct AcceptancePlan {
 /// Reads a plan. Errors: every mistake with its place in `file`.
 [[nodiscard]] Result<AcceptancePlan> read_acceptance_plan(const yaml::Node &root, const std::string &file);
 
-/// Returns the factors of the points: dags, workers, deadlines, preemption, utilization.
+/// Returns the factors of the points: dags, workers, preemption, utilization.
 [[nodiscard]] std::vector<Factor> factors_of(const AcceptancePlan &plan);
 /// Returns the generator's options at a point.
 [[nodiscard]] lab::GenerateOptions generate_options(const AcceptancePlan &plan, const Point &point);
@@ -92,7 +79,6 @@ class Acceptance final : public Experiment {
   [[nodiscard]] std::uint64_t unit_count() const override { return points_.size() * plan_.sets; }
   [[nodiscard]] Result<std::string> evaluate(std::uint64_t unit) const override;
   [[nodiscard]] Result<void> add(std::uint64_t unit, const std::string &result) override;
-  /// Replays the first violations, as more files. Errors: those of draw().
   [[nodiscard]] Result<Results> results() const override;
 
   /// Draws a unit's workload. Units that differ only in preemption have the same workload. In a DAG of several tasks
@@ -101,9 +87,6 @@ class Acceptance final : public Experiment {
   /// Returns the methods that accept the unit soundly although the simulation saw a miss. Any such method shows a
   /// mistake in redag.
   [[nodiscard]] std::vector<std::string> broken_by(std::string_view result) const;
-  /// Returns the run with the miss of such a unit as a workload file. Comments in it name the command that shows the
-  /// miss.
-  [[nodiscard]] Result<std::string> replay(std::uint64_t unit, std::string_view result) const;
 
  private:
   /// The counts of one method at one point.

@@ -15,7 +15,6 @@ namespace redag::experiment {
 namespace {
 
 constexpr std::array kPreemptions = {PreemptionMode::None, PreemptionMode::Os};
-constexpr std::array kDeadlineKinds = {DeadlineKind::Implicit, DeadlineKind::Constrained};
 constexpr std::uint64_t kMostTasks = 100'000;  // of one workload
 
 class AcceptanceReader : private PlanReader {
@@ -24,8 +23,8 @@ class AcceptanceReader : private PlanReader {
 
   Result<AcceptancePlan> run() {
     if (check_map(root_, "a plan",
-                  {"experiment", "name", "seed", "sets", "utilization", "dags", "workers", "deadlines", "preemption",
-                   "methods", "simulation", "workload"})) {
+                  {"experiment", "name", "seed", "sets", "utilization", "dags", "workers", "preemption", "methods",
+                   "simulation", "workload"})) {
       read();
       if (diagnostics_.empty()) check();
     }
@@ -41,7 +40,6 @@ class AcceptanceReader : private PlanReader {
     take_range("utilization", plan_.utilization);
     take_list("dags", plan_.dags);
     take_list("workers", plan_.workers);
-    take_list("deadlines", plan_.deadlines, kDeadlineKinds);
     take_list("preemption", plan_.preemption, kPreemptions);
     take_list("methods", plan_.methods);
     const Node *simulation = yaml::find(root_, "simulation");

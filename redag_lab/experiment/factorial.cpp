@@ -176,7 +176,7 @@ Result<std::string> Factorial::evaluate(std::uint64_t unit) const {
     run.error().front().message += fmt::format(" ({})", describe(factors_, points_[unit % points_.size()]));
     return tl::unexpected<Diagnostics>(std::move(run.error()));
   }
-  return to_line(observe(*run, plan_.paper_startup));
+  return to_line(observe(*run));
 }
 
 Result<void> Factorial::add(std::uint64_t unit, const std::string &result) {

@@ -54,8 +54,7 @@ struct FactorialPlan {
   std::uint32_t repetitions = 1;
   Duration duration = 10 * kSecond;
   Duration warm_up = 0;
-  sim::Overheads overheads;                    // simulator; ideal and unlimited have none
-  Duration paper_startup = 15 * kMillisecond;  // metrics/paper_accounting.hpp
+  sim::Overheads overheads;  // simulator; ideal and unlimited have none
   // The factors, in the order of the columns.
   std::vector<WorkloadSource> workloads;
   std::vector<PolicyKind> policies;

@@ -60,8 +60,8 @@ class FactorialReader : private PlanReader {
       : PlanReader(root, std::move(file)), executors_(executors) {}
 
   Result<FactorialPlan> run() {
-    std::vector<std::string_view> keys = {"experiment", "name",    "world",     "seed",         "repetitions",
-                                          "duration",   "warm_up", "overheads", "paper_startup"};
+    std::vector<std::string_view> keys = {"experiment",  "name",     "world",   "seed",
+                                          "repetitions", "duration", "warm_up", "overheads"};
     keys.insert(keys.end(), kFactorKeys.begin(), kFactorKeys.end());
     if (check_map(root_, "a plan", keys)) {
       read();
@@ -79,7 +79,6 @@ class FactorialReader : private PlanReader {
     take(root_, "repetitions", plan_.repetitions);
     take(root_, "duration", plan_.duration);
     take(root_, "warm_up", plan_.warm_up);
-    take(root_, "paper_startup", plan_.paper_startup);
     read_overheads();
     read_workloads();
     take_list("policies", plan_.policies, kPolicies);

@@ -44,7 +44,7 @@ std::string errors_of(const std::string &text) {
 TEST(FactorialPlan, WhatItSaysIsWhatItMeans) {
   const FactorialPlan plan = parsed(std::string("experiment: factorial\nname: all\nworld: threads\nseed: 7\n"
                                                 "repetitions: 3\nduration: 2s\nwarm_up: 100ms\n"
-                                                "overheads: {release: 1us, preempt: 3us}\npaper_startup: 10ms\n"
+                                                "overheads: {release: 1us, preempt: 3us}\n"
                                                 "workers: [1, 2]\npolicies: [edf, fifo]\ndeadline_scale: [0.8, 1]\n"
                                                 "demand_scale: 2\nutilization: {from: 0.5, to: 0.7, step: 0.1}\n"
                                                 "max_active: [unbounded, 3, [1, 2]]\n"

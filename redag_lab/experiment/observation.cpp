@@ -58,7 +58,8 @@ std::vector<Duration> work_of(const trace::Trace &trace, std::size_t tasks) {
 
 }  // namespace
 
-Observation observe(const FinishedRun &run, Duration paper_startup) {
+Observation observe(const FinishedRun &run) {
+  constexpr Duration kPaperStartup = 15 * kMillisecond;
   const trace::RunInfo &info = run.trace.info;
   const std::vector<metrics::JobRecord> jobs = metrics::fold_jobs(info.workload, run.trace.events);
   const std::vector<TaskRef> refs = flatten(info.workload);
@@ -80,7 +81,7 @@ Observation observe(const FinishedRun &run, Duration paper_startup) {
     const metrics::PaperCount paper = metrics::paper_count(info.workload, jobs, 0, dag);
     row.figures[kPaperMissRatio] = ratio(paper.late, paper.jobs);
     row.figures[kPaperStartupMissRatio] =
-        ratio(metrics::paper_count(info.workload, jobs, paper_startup, dag).late, paper.jobs);
+        ratio(metrics::paper_count(info.workload, jobs, kPaperStartup, dag).late, paper.jobs);
     row.figures[kPaperMaxLateness] = paper.max_lateness;
     Duration had_workers = 0;
     for (const TaskRef &ref : refs) had_workers += !dag || ref.dag == *dag ? work[ref.id.value] : 0;

@@ -26,7 +26,7 @@ enum Figure : std::uint8_t {
   kDropRatio,
   kExcessMissRatio,        // above the ideal on the same jobs; not of a run alone
   kPaperMissRatio,         // the paper's accounting (metrics/paper_accounting.hpp): with the true epoch,
-  kPaperStartupMissRatio,  // and with an epoch before start-up
+  kPaperStartupMissRatio,  // and with an epoch 15 ms before the first release
   kMaxLateness,
   kPaperMaxLateness,
   kResponseP50,
@@ -78,7 +78,7 @@ struct FinishedRun {
   metrics::CheckReport check;
 };
 
-[[nodiscard]] Observation observe(const FinishedRun &run, Duration paper_startup);
+[[nodiscard]] Observation observe(const FinishedRun &run);
 
 /// Returns the observation as one line, from which parse_observation() restores it. Parsing fails on any other form.
 [[nodiscard]] std::string to_line(const Observation &observation);

@@ -47,8 +47,7 @@ void PlanReader::take_range(const char *key, std::vector<std::uint32_t> &out) {
 }
 
 std::vector<std::string_view> PlanReader::generation_keys(std::vector<std::string_view> more) {
-  more.insert(more.end(), {"tasks", "shape", "edge_probability", "policy", "max_active", "periods", "period_min",
-                           "period_max", "period_granularity", "jitter", "max_task_utilization", "utilization_method"});
+  more.insert(more.end(), {"tasks", "shape", "periods", "period_min", "period_max", "max_task_utilization"});
   return more;
 }
 
@@ -62,17 +61,10 @@ void PlanReader::take_generation(const Node &map, lab::GenerateOptions &out) {
     take(*tasks, "max", out.max_tasks);
   }
   take(map, "shape", out.shape, lab::kDagShapes);
-  take(map, "edge_probability", out.edge_probability);
-  take(map, "policy", out.policy, kPolicies);
-  take(map, "max_active", out.max_active_max, 0);
-  out.max_active_min = out.max_active_max;
   take(map, "periods", out.periods, lab::kPeriodModels);
   take(map, "period_min", out.period_min);
   take(map, "period_max", out.period_max);
-  take(map, "period_granularity", out.period_granularity);
-  take(map, "jitter", out.jitter);
   take(map, "max_task_utilization", out.max_task_utilization);
-  take(map, "utilization_method", out.method, lab::kUtilizationMethods);
 }
 
 void PlanReader::mistake(std::string_view key, std::string message, std::string hint) {

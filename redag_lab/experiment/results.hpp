@@ -9,7 +9,6 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "redag_lab/experiment/grid.hpp"
@@ -57,7 +56,6 @@ struct Results {
   std::uint64_t units = 0;           // of the plan
   std::uint64_t done = 0;
   std::vector<Remark> remarks;  // what was checked; not all good: the experiment found a mistake in redag
-  std::vector<std::pair<std::string, std::string>> files;  // more files for the folder: name and text
 
   [[nodiscard]] bool all_good() const;
 };

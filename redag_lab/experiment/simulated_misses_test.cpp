@@ -11,12 +11,12 @@
 namespace redag::experiment {
 namespace {
 
-std::optional<SeenMiss> miss_of(const std::string &text, SimulationEffort effort = {}) {
+bool miss_of(const std::string &text, SimulationEffort effort = {}) {
   const Result<LoadedWorkload> loaded = parse_workload(text, "test.yaml");
   EXPECT_TRUE(loaded) << to_string(loaded.error());
   const auto task_set = analysis::compile(loaded->workload, analysis::platform_of(loaded->workload));
   EXPECT_TRUE(task_set);
-  return find_miss(loaded->workload, *task_set, effort, 1);
+  return sees_miss(loaded->workload, *task_set, effort, 1);
 }
 
 std::string workload(const std::string &dags, const std::string &preemption = "os") {
@@ -33,8 +33,7 @@ TEST(SimulatedMisses, LateJob) {
   const auto miss =
       miss_of(workload("  - {name: a, tasks: [{name: t, wcet: 5ms, period: 10ms}]}\n"
                        "  - {name: b, tasks: [{name: t, wcet: 6ms, period: 20ms, deadline: 15ms}]}\n"));
-  ASSERT_TRUE(miss);
-  EXPECT_EQ(miss->duration, 100 * kMillisecond);
+  EXPECT_TRUE(miss);
 }
 
 TEST(SimulatedMisses, ExecutesForTheWcet) {
@@ -48,7 +47,7 @@ TEST(SimulatedMisses, SkippedJob) {
                                      "  - {name: b, tasks: [{name: t, wcet: 1ms, period: 10ms}]}\n",
                                      "none"),
                             {5, 5});
-  ASSERT_TRUE(miss);
+  EXPECT_TRUE(miss);
 }
 
 // Released together, the urgent task runs first and no job misses. Only other offsets reveal the miss.

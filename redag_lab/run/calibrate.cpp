@@ -11,22 +11,23 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <memory>
 #include <optional>
-#include <unordered_map>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "redag/base/check.hpp"
+#include "redag/base/int128.hpp"
 #include "redag/base/rounded_time.hpp"
 #include "redag/engine/preemption_point.hpp"
 #include "redag/threads/clock.hpp"
+#include "redag/threads/parker.hpp"
 #include "redag/threads/setup.hpp"
 #include "redag/threads/threads.hpp"
 #include "redag/trace/trace.hpp"
 #include "redag_lab/run/machine_load.hpp"
 #include "redag_lab/run/run_workload.hpp"
-#include "redag_lab/run/stall_probe.hpp"
 
 namespace redag::lab {
 namespace {
@@ -34,9 +35,11 @@ namespace {
 constexpr Duration kShortestSlice = 250 * kMillisecond;
 constexpr Duration kLongestSlice = 2 * kSecond;
 constexpr Duration kRegion = 200 * kMicrosecond;
+constexpr Duration kShortestGap = 2 * kMicrosecond;  // shorter ones are caused by the loop itself
 constexpr const char *kLong = "long";
-
-// ---- findings of one class of threads ----
+constexpr Duration kBurst = 40 * kMillisecond;  // a watching SCHED_FIFO thread pauses, lest the kernel throttle it
+constexpr Duration kPause = 10 * kMillisecond;
+constexpr std::size_t kMostGaps = std::size_t{1} << 17U;
 
 std::vector<Duration> lengths_of(std::span<const LossSample> samples) {
   std::vector<Duration> lengths;
@@ -54,81 +57,117 @@ void take_larger(Loss &loss, const Loss &other) {
   loss.per_second = std::max(loss.per_second, other.per_second);
 }
 
+// An interval in which a thread that reads the clock without end did not run.
+struct Gap {
+  Duration at = 0;       // its end, in watched time
+  Duration length = 0;   // wall-clock time
+  Duration charged = 0;  // processor time charged to the thread: the kernel's work in its name
+};
+
+struct WatchedProcessor {
+  Duration watched = 0;
+  std::vector<Gap> gaps;
+};
+
+// What was found of one class of threads.
 struct Findings {
   std::vector<LossSample> dispatch;
   std::vector<LossSample> preempt;
-  Duration ran = 0;                                      // wall-clock time of the runs with jobs
-  std::map<std::string, std::vector<Duration>> samples;  // by the quantity's name
-  std::vector<WatchedProcessor> processors;
-
-  void add(const std::string &name, std::vector<Duration> more) {
-    std::vector<Duration> &all = samples[name];
-    all.insert(all.end(), more.begin(), more.end());
-  }
+  Duration ran = 0;  // wall-clock time of the runs with jobs
+  std::vector<Duration> lateness;
+  std::vector<Duration> timer;
+  std::map<int, WatchedProcessor> processors;
 
   void add(const TraceFigures &figures, Duration length) {
-    add("lateness", figures.lateness);
+    lateness.insert(lateness.end(), figures.lateness.begin(), figures.lateness.end());
     append(dispatch, figures.dispatch, ran);
     append(preempt, figures.preempt, ran);
     ran += length;
   }
 
-  void add(std::vector<WatchedProcessor> more) {
-    processors.resize(std::max(processors.size(), more.size()));
-    for (std::size_t i = 0; i < more.size(); ++i) {
-      WatchedProcessor &processor = processors[i];
-      for (Gap gap : more[i].gaps) {
-        gap.at += processor.watched;
-        processor.gaps.push_back(gap);
-      }
-      processor.watched += more[i].watched;
-      processor.cpu = more[i].cpu;
-    }
-  }
-
-  [[nodiscard]] Duration longest(const std::string &name) const {
-    const auto found = samples.find(name);
-    return found == samples.end() ? 0 : *std::max_element(found->second.begin(), found->second.end());
-  }
-
   [[nodiscard]] bool is_complete() const {
-    const auto has = [this](const char *name) {
-      const auto found = samples.find(name);
-      return found != samples.end() && !found->second.empty();
-    };
-    return has("lateness") && has("timer") && !dispatch.empty() && !preempt.empty() &&
-           std::any_of(processors.begin(), processors.end(), [](const WatchedProcessor &p) { return p.watched > 0; });
+    return !lateness.empty() && !timer.empty() && !dispatch.empty() && !preempt.empty() &&
+           std::any_of(processors.begin(), processors.end(), [](const auto &each) { return each.second.watched > 0; });
   }
 
-  [[nodiscard]] Loss loss(Duration Gap::*part) const {
-    Loss worst;
-    for (const WatchedProcessor &processor : processors) {
+  // Returns the losses of each processor, with the time for which it was watched.
+  [[nodiscard]] std::vector<std::pair<std::vector<LossSample>, Duration>> losses(Duration Gap::*part) const {
+    std::vector<std::pair<std::vector<LossSample>, Duration>> all;
+    for (const auto &[cpu, processor] : processors) {
       std::vector<LossSample> lost;
       for (const Gap &gap : processor.gaps) {
         if (gap.*part > 0) lost.push_back({gap.at, gap.*part});
       }
-      const Loss fitted = fit_loss(lost, processor.watched);
-      take_larger(worst, fitted);
+      all.emplace_back(std::move(lost), processor.watched);
     }
-    return worst;
+    return all;
   }
 
-  void include(const Findings &other) {
-    for (const auto &[name, values] : other.samples) add(name, values);
-    append(dispatch, other.dispatch, ran);
-    append(preempt, other.preempt, ran);
-    ran += other.ran;
-    add(other.processors);
+  [[nodiscard]] Loss loss(Duration Gap::*part) const {
+    Loss worst;
+    for (const auto &[lost, watched] : losses(part)) take_larger(worst, fit_loss(lost, watched));
+    return worst;
   }
 };
 
-Measured measured(std::string what, const char *threads, const char *load, std::vector<Duration> values) {
-  std::sort(values.begin(), values.end());
-  const auto at = [&](double share) {
-    return values[std::min(values.size() - 1, static_cast<std::size_t>(share * static_cast<double>(values.size())))];
-  };
-  return {std::move(what), threads, load, values.size(), at(0.5), at(0.99), at(0.999), values.back()};
-}
+// A thread that reads the clock without end on one processor and records the gaps, as Linux's osnoise tracer does.
+class Watcher {
+ public:
+  Watcher(Duration length, const std::atomic<bool> *stop) : length_(length), stop_(stop), gaps_(kMostGaps) {}
+
+  Result<void> start(int cpu, int fifo_priority) {
+    return runtime::start_thread({"redag-stalls", fifo_priority, {cpu}}, [this] { main(); })
+        .map([this](runtime::ThreadHandle &&thread) { thread_ = std::move(thread); });
+  }
+
+  // Ends the thread and adds its findings to `processor`.
+  void join(WatchedProcessor &processor) {
+    if (thread_.joinable()) thread_.join();
+    for (std::size_t i = 0; i < count_; ++i) {
+      gaps_[i].at += processor.watched;
+      processor.gaps.push_back(gaps_[i]);
+    }
+    processor.watched += watched_;
+  }
+
+ private:
+  [[nodiscard]] bool stopped() const { return stop_ != nullptr && stop_->load(); }
+
+  void main() {
+    const Time end = runtime::monotonic_now() + length_;
+    runtime::Event never;
+    for (Time now = runtime::monotonic_now(); now < end && !stopped(); now = runtime::monotonic_now()) {
+      watch(std::min(now + kBurst, end));
+      // Ordinary threads pause as well, and other threads that want to run do so during the pause.
+      never.wait_until(runtime::monotonic_now() + kPause);
+    }
+  }
+
+  void watch(Time until) {
+    Duration cpu = runtime::thread_cpu_now();
+    Time read_at = runtime::monotonic_now();
+    const Time begun = read_at;
+    Time last = read_at;
+    for (Time now = runtime::monotonic_now(); now < until && count_ < kMostGaps;
+         last = now, now = runtime::monotonic_now()) {
+      const Duration length = now - last;
+      if (length < kShortestGap) continue;
+      const Duration used = runtime::thread_cpu_now();
+      const Duration uncharged = (now - read_at) - (used - cpu);
+      gaps_[count_++] = Gap{watched_ + now - begun, length, std::clamp<Duration>(length - uncharged, 0, length)};
+      cpu = used;
+      read_at = now = runtime::monotonic_now();
+    }
+    watched_ += last - begun;
+  }
+
+  Duration length_;
+  const std::atomic<bool> *stop_;
+  std::vector<Gap> gaps_;  // their pages are touched before the measurement
+  std::size_t count_ = 0;
+  Duration watched_ = 0;
+  runtime::ThreadHandle thread_;
+};
 
 // ---- processor time of the release timer, whose thread is this process's own ----
 
@@ -217,40 +256,32 @@ class Noted {
   std::vector<std::vector<Absence>> absences_;
 };
 
-Duration clock_cost(std::vector<Duration> &thread_clock, std::vector<Duration> &steady_clock) {
+// Returns the differences between readings of a thread's processor-time clock.
+std::vector<Duration> clock_costs() {
   constexpr int kReadings = 20'000;
+  std::vector<Duration> costs;
   Duration before = runtime::thread_cpu_now();
   for (int i = 0; i < kReadings; ++i) {
     const Duration now = runtime::thread_cpu_now();
-    thread_clock.push_back(now - before);
+    costs.push_back(now - before);
     before = now;
   }
-  Time earlier = runtime::monotonic_now();
-  for (int i = 0; i < kReadings; ++i) {
-    const Time now = runtime::monotonic_now();
-    steady_clock.push_back(now - earlier);
-    earlier = now;
-  }
-  std::sort(thread_clock.begin(), thread_clock.end());
-  return thread_clock[thread_clock.size() * 999 / 1000];
+  return costs;
 }
 
 class Calibrating {
  public:
-  explicit Calibrating(const CalibrateOptions &options) : options_(options), band_(runtime::probe_priority_band()) {}
+  explicit Calibrating(const CalibrateOptions &options)
+      : options_(options), band_(runtime::probe_priority_band()), cpus_(runtime::usable_cpus()) {}
 
   Result<Calibration> run() {
-    const std::size_t cpus = runtime::usable_cpus().size();
-    workload_ = calibration_workload(static_cast<std::uint32_t>(cpus));
-    std::vector<Duration> thread_clock;
-    std::vector<Duration> steady_clock;
-    clock_ = clock_cost(thread_clock, steady_clock);
-    result_.measured.push_back(measured("thread_clock", "any", "idle", std::move(thread_clock)));
-    result_.measured.push_back(measured("steady_clock", "any", "idle", std::move(steady_clock)));
+    workload_ = calibration_workload(static_cast<std::uint32_t>(cpus_.size()));
+    result_.load = options_.loaded ? "idle and loaded" : "idle";
+    note("thread_clock", "any", clock_costs());
     const Time begun = runtime::monotonic_now();
-    if (Result<void> done = measure(cpus); !done) return tl::unexpected(done.error());
+    if (Result<void> done = measure(); !done) return tl::unexpected(done.error());
     result_.duration = runtime::monotonic_now() - begun;
-    return conclude(cpus);
+    return conclude();
   }
 
  private:
@@ -262,9 +293,8 @@ class Calibrating {
 
   [[nodiscard]] bool stopped() const { return options_.stop != nullptr && options_.stop->load(); }
 
-  // Measures all slices in turn, several times over. A calibration that is stopped early then has results of each
-  // slice.
-  Result<void> measure(std::size_t cpus) {
+  // Measures all slices in turn, several times over: what changes during the measurement concerns them all.
+  Result<void> measure() {
     std::vector<Slice> slices;
     for (const bool loaded : {false, true}) {
       if (loaded && !options_.loaded) continue;
@@ -277,41 +307,39 @@ class Calibrating {
     const auto count = static_cast<Duration>(slices.size());
     constexpr Duration kRounds = 4;
     const Duration rounds = std::clamp<Duration>(options_.duration / (count * kShortestSlice), 1, kRounds);
-    const Duration each = options_.duration / (count * rounds);
-    const Duration turns = std::max<Duration>(1, (each + kLongestSlice - 1) / kLongestSlice) * rounds;
+    const Duration turns = std::max(rounds, options_.duration / (count * kLongestSlice) + 1);
     const Duration length = std::max<Duration>(options_.duration / (count * turns), 10 * kMillisecond);
-    for (Duration turn = 0; turn < turns; ++turn) {
-      for (std::size_t s = 0; s < slices.size(); ++s) {
-        if (stopped()) {
-          result_.complete = false;
-          return {};
-        }
-        const Slice &slice = slices[s];
-        if (options_.progress) {
-          const double done =
-              static_cast<double>(turn * count + static_cast<Duration>(s)) / static_cast<double>(turns * count);
-          options_.progress(done, slice.stalls ? "stalls" : "dispatch, preemption, timer");
-        }
-        MachineLoad load;
-        if (slice.loaded) {
-          if (Result<void> started = load.start(cpus); !started) return started;
-        }
-        // The first turn is short: a calibration that is stopped early soon has a result of each slice.
-        const Duration now = turn == 0 ? std::min(length, kShortestSlice) : length;
-        Result<void> done = slice.stalls ? watch_stalls(slice, now) : run_jobs(slice, now);
-        if (!done) return done;
+    for (Duration done = 0; done < turns * count; ++done) {
+      const Slice &slice = slices[static_cast<std::size_t>(done % count)];
+      if (options_.progress) {
+        options_.progress(static_cast<double>(done) / static_cast<double>(turns * count),
+                          slice.stalls ? "stalls" : "dispatch, preemption, timer");
       }
+      MachineLoad load;
+      if (slice.loaded) {
+        if (Result<void> started = load.start(cpus_.size()); !started) return started;
+      }
+      const Result<void> measured = slice.stalls ? watch_for_stalls(slice, length) : run_jobs(slice, length);
+      if (!measured) return measured;
+      if (stopped()) return make_error("interrupted: a part of a measurement can miss the largest values");
     }
-    result_.complete = result_.complete && !stopped();
     return {};
   }
 
-  Findings &findings(const Slice &slice) { return findings_[slice.realtime ? 1 : 0][slice.loaded ? 1 : 0]; }
+  Findings &findings(const Slice &slice) { return findings_[slice.realtime ? 1 : 0]; }
 
-  Result<void> watch_stalls(const Slice &slice, Duration length) {
-    // The probe has the lowest priority of all jobs. Anything above it can also take a processor from a job.
-    return watch_for_stalls({length, slice.realtime ? 1 : 0, options_.stop})
-        .map([&](std::vector<WatchedProcessor> watched) { findings(slice).add(std::move(watched)); });
+  // Watches all processors at the same time. The threads have the lowest priority of all jobs: anything above them can
+  // also take a processor from a job.
+  Result<void> watch_for_stalls(const Slice &slice, Duration length) {
+    std::vector<std::unique_ptr<Watcher>> watchers;
+    Result<void> started;
+    for (const int cpu : cpus_) {
+      watchers.push_back(std::make_unique<Watcher>(length, options_.stop));
+      started = watchers.back()->start(cpu, slice.realtime ? 1 : 0);
+      if (!started) break;
+    }
+    for (std::size_t i = 0; i < watchers.size(); ++i) watchers[i]->join(findings(slice).processors[cpus_[i]]);
+    return started;
   }
 
   Result<void> run_jobs(const Slice &slice, Duration length) {
@@ -332,29 +360,26 @@ class Calibrating {
     return run_workload(workload_, run).map([&](const RunResult &result) {
       Findings &found = findings(slice);
       found.add(figures_of(workload_, result.trace.events, noted.all()), result.trace.info.end);
-      found.add("timer", timer.take());
+      const std::vector<Duration> means = timer.take();
+      found.timer.insert(found.timer.end(), means.begin(), means.end());
     });
   }
 
-  Result<Calibration> conclude(std::size_t cpus) {
+  Result<Calibration> conclude() {
     for (const bool realtime : {true, false}) {
-      Findings all;
-      for (const bool loaded : {false, true}) {
-        const Findings &found = findings_[realtime ? 1 : 0][loaded ? 1 : 0];
-        note(found, realtime ? "realtime" : "normal", loaded ? "loaded" : "idle");
-        all.include(found);
-      }
-      if (!all.is_complete()) continue;
+      const Findings &found = findings_[realtime ? 1 : 0];
+      note_all(found, realtime ? "realtime" : "normal");
+      if (!found.is_complete()) continue;
       Overheads charged;
-      charged.timer = all.longest("timer");
-      charged.lateness = all.longest("lateness");
-      charged.stall = all.loss(&Gap::length);
-      charged.noise = all.loss(&Gap::charged);
-      charged.clock = clock_;
+      charged.timer = *std::max_element(found.timer.begin(), found.timer.end());
+      charged.lateness = *std::max_element(found.lateness.begin(), found.lateness.end());
+      charged.stall = found.loss(&Gap::length);
+      charged.noise = found.loss(&Gap::charged);
+      charged.clock = result_.measured.front().p999;
       Loss beyond;
-      charged.dispatch = usual_delay(all.dispatch, all.ran, beyond);
+      charged.dispatch = usual_delay(found.dispatch, found.ran, beyond);
       take_larger(charged.stall, beyond);
-      charged.preempt = usual_delay(all.preempt, all.ran, beyond);
+      charged.preempt = usual_delay(found.preempt, found.ran, beyond);
       take_larger(charged.stall, beyond);
       // Rounds up, because people read these numbers and no measurement is accurate to the nanosecond.
       for (const std::string_view name : overhead_names()) {
@@ -367,40 +392,42 @@ class Calibrating {
       return make_error("the calibration ended before everything was measured once: there is nothing to write",
                         "on most machines, a second is long enough");
     }
-    result_.processors = static_cast<std::uint32_t>(cpus);
+    result_.processors = static_cast<std::uint32_t>(cpus_.size());
     result_.processor = trace::this_machine().model;
     result_.rights = band_.top_job > 0 ? fmt::format("SCHED_FIFO up to {}", band_.timer) : "no SCHED_FIFO";
-    result_.load = options_.loaded ? "idle and loaded" : "idle";
     return std::move(result_);
   }
 
-  void note(const Findings &found, const char *threads, const char *load) {
-    for (const auto &[name, values] : found.samples) {
-      if (!values.empty()) result_.measured.push_back(measured(name, threads, load, values));
-    }
-    if (!found.dispatch.empty()) {
-      result_.measured.push_back(measured("dispatch", threads, load, lengths_of(found.dispatch)));
-    }
-    if (!found.preempt.empty()) {
-      result_.measured.push_back(measured("preempt", threads, load, lengths_of(found.preempt)));
-    }
+  void note_all(const Findings &found, const char *threads) {
+    note("timer", threads, found.timer);
+    note("lateness", threads, found.lateness);
+    note("dispatch", threads, lengths_of(found.dispatch));
+    note("preempt", threads, lengths_of(found.preempt));
     for (const auto &[name, part] : {std::pair("stall", &Gap::length), std::pair("noise", &Gap::charged)}) {
       std::vector<Duration> lengths;
-      for (const WatchedProcessor &processor : found.processors) {
-        for (const Gap &gap : processor.gaps) {
-          if (gap.*part > 0) lengths.push_back(gap.*part);
-        }
+      for (const auto &[lost, watched] : found.losses(part)) {
+        for (const LossSample &sample : lost) lengths.push_back(sample.length);
       }
-      if (!lengths.empty()) result_.measured.push_back(measured(name, threads, load, std::move(lengths)));
+      note(name, threads, std::move(lengths));
     }
+  }
+
+  // Adds the distribution of a quantity to the result.
+  void note(const char *what, const char *threads, std::vector<Duration> values) {
+    if (values.empty()) return;
+    std::sort(values.begin(), values.end());
+    const auto at = [&](double share) {
+      return values[std::min(values.size() - 1, static_cast<std::size_t>(share * static_cast<double>(values.size())))];
+    };
+    result_.measured.push_back({what, threads, result_.load, values.size(), at(0.5), at(0.99), at(0.999), at(1)});
   }
 
   const CalibrateOptions &options_;
   runtime::PriorityBand band_;
+  std::vector<int> cpus_;
   Workload workload_;
-  Duration clock_ = 0;
   std::uint64_t seed_ = 0;
-  std::array<std::array<Findings, 2>, 2> findings_;  // [realtime][loaded]
+  std::array<Findings, 2> findings_;  // by realtime
   Calibration result_;
 };
 
@@ -470,6 +497,26 @@ TraceFigures figures_of(const Workload &workload, std::span<const JobEvent> even
   const auto earlier = [](const LossSample &x, const LossSample &y) { return x.at < y.at; };
   std::sort(figures.dispatch.begin(), figures.dispatch.end(), earlier);
   return figures;
+}
+
+Loss fit_loss(std::span<const LossSample> samples, Duration watched) {
+  Loss loss;
+  if (samples.empty() || watched <= 0) return loss;
+  Int128 sum = 0;
+  for (const LossSample &sample : samples) sum += sample.length;
+  // A processor that is lost most of the time guarantees nothing. The rate is capped just below one, and a bound then
+  // reports the failure.
+  const Int128 twice = (2 * sum * kSecond + watched - 1) / watched;
+  loss.per_second = static_cast<Duration>(std::min<Int128>(twice, kSecond - kMillisecond));
+  Duration level = 0;
+  Duration at = 0;
+  for (const LossSample &sample : samples) {
+    const Int128 leaked = Int128{sample.at - at} * loss.per_second / kSecond;
+    level = std::max<Duration>(0, level - static_cast<Duration>(leaked)) + sample.length;
+    loss.longest = std::max(loss.longest, level);
+    at = sample.at;
+  }
+  return loss;
 }
 
 Duration usual_delay(std::span<const LossSample> delays, Duration watched, Loss &beyond) {

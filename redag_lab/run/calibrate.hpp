@@ -2,36 +2,36 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Measures the overheads that this machine adds to jobs. The runtime runs a workload made for the purpose, and its
-// trace shows how late releases, dispatches and resumptions were. stall_probe.hpp measures the other losses of
-// processor time. Blocks for the requested duration. Meanwhile nothing else should run, unless its effect is to be
-// measured.
+// trace shows how late releases, dispatches and resumptions were. Then a thread on each processor reads the clock
+// without end, and the gaps show what else takes processors away. Blocks for the requested duration. Meanwhile nothing
+// else should run, unless its effect is to be measured.
 #pragma once
 
 #include <atomic>
 #include <cstdint>
 #include <functional>
 #include <span>
+#include <vector>
 
 #include "redag/base/result.hpp"
 #include "redag/loader/calibration.hpp"
 #include "redag/model/job_event.hpp"
 #include "redag/model/workload.hpp"
-#include "redag_lab/run/stall_probe.hpp"
 
 namespace redag::lab {
 
 struct CalibrateOptions {
   Duration duration = 30 * kSecond;
   bool loaded = false;                      // half of the time with threads that keep the machine busy
-  const std::atomic<bool> *stop = nullptr;  // ends the measurement early, with the results so far
+  const std::atomic<bool> *stop = nullptr;  // ends the measurement early
   /// Called between measurements, at least every few seconds, with the share that is done and the next measurement's
   /// name.
   std::function<void(double done, const char *next)> progress;
 };
 
-/// Measures the overheads. The caller adds `date`, `host`, `kernel` and `version`. The result is not `complete` if the
-/// measurement was stopped. It leaves out a class of threads of which something was not measured. Error: threads cannot
-/// be created, or nothing was measured.
+/// Measures the overheads. The caller adds `date`, `host`, `kernel` and `version`. The result leaves out a class of
+/// threads of which something was not measured. Error: threads cannot be created, nothing was measured, or the
+/// measurement was stopped.
 [[nodiscard]] Result<Calibration> calibrate(const CalibrateOptions &options);
 
 // ---- the parts, exposed for tests ----
@@ -45,6 +45,16 @@ struct Absence {
   Time begin = 0;
   Time end = 0;
 };
+
+/// A loss of `length` at the instant `at`.
+struct LossSample {
+  Duration at = 0;
+  Duration length = 0;
+};
+
+/// Returns a leaky bucket in which all samples fit. It leaks at twice the mean rate of the losses in `watched` time,
+/// and is as large as its highest level. Requires samples in order of time.
+[[nodiscard]] Loss fit_loss(std::span<const LossSample> samples, Duration watched);
 
 /// Delays found in a trace. `at` is the instant of the decision; samples are in order of it.
 struct TraceFigures {

@@ -6,15 +6,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include <tbb/parallel_for.h>
-
 #include "redag/base/check.hpp"
-#include "redag/base/rng.hpp"
+#include "redag_analysis/metrics/distribution.hpp"
 
 namespace redag::lab {
 namespace {
 
-constexpr Duration kMostBlocks = 30;
+constexpr std::array<double, 3> kPercents = {50, 95, 99};
 
 Duration longest_period(const Workload &workload) {
   Duration longest = 1;
@@ -24,20 +22,98 @@ Duration longest_period(const Workload &workload) {
   return longest;
 }
 
-// Returns a multiple of the longest period, at least two of them and long enough for at most 30 blocks. Every block
-// then sees the same releases.
-Duration block_length(Duration run, Duration period) {
-  return period * std::max<Duration>(2, (run + kMostBlocks * period - 1) / (kMostBlocks * period));
+// Returns a multiple of the longest period: every stretch then sees the same releases.
+Duration stretch_length(Duration run, Duration period) {
+  return period * std::max<Duration>(2, (run + kStretches * period - 1) / (kStretches * period));
 }
 
 bool is_row(const DifferenceSide::Row &a, const DifferenceSide::Row &b) { return a.dag == b.dag && a.task == b.task; }
 
 std::string name_of(const DifferenceSide::Row &row) { return row.task.empty() ? row.dag : row.dag + "." + row.task; }
 
-Verdict verdict_of(const FigureDifference &figure, double threshold) {
-  if (!figure.tested) return Verdict::NotTested;
-  if (figure.p() > threshold) return Verdict::Same;
-  return figure.p_more < figure.p_less ? Verdict::Worse : Verdict::Better;
+using Jobs = DifferenceSide::Jobs;
+
+void add(Jobs &sum, const Jobs &jobs) {
+  sum.released += jobs.released;
+  sum.missed += jobs.missed;
+  sum.responses.insert(sum.responses.end(), jobs.responses.begin(), jobs.responses.end());
+}
+
+// Returns the jobs of each sample, with sorted responses: of whole runs, or of stretches in which jobs were released.
+std::vector<Jobs> samples_of(const DifferenceSide::Row &row, bool of_runs) {
+  std::vector<Jobs> samples;
+  for (const std::vector<Jobs> &run : row.runs) {
+    if (of_runs) samples.emplace_back();
+    for (const Jobs &stretch : run) {
+      if (!of_runs && stretch.released > 0) samples.push_back(stretch);
+      if (of_runs) add(samples.back(), stretch);
+    }
+  }
+  for (Jobs &sample : samples) std::sort(sample.responses.begin(), sample.responses.end());
+  return samples;
+}
+
+double miss_ratio(const Jobs &jobs) {
+  return jobs.released == 0 ? 0 : static_cast<double>(jobs.missed) / static_cast<double>(jobs.released);
+}
+
+double response(const Jobs &jobs, double percent) {
+  return jobs.responses.empty() ? 0 : static_cast<double>(metrics::percentile(jobs.responses, percent));
+}
+
+// Tests whether the values of B are larger, or smaller, by more than the tolerance.
+void test(const std::vector<double> &a, const std::vector<double> &b, double tolerance, FigureDifference &figure) {
+  const auto scaled = [&a](double factor) {
+    std::vector<double> values = a;
+    for (double &value : values) value *= factor;
+    return values;
+  };
+  const double more = p_larger(scaled(1 + tolerance), b);
+  const double less = p_larger(b, scaled(1 - tolerance));
+  figure.p = std::min(1.0, 2 * std::min(more, less));
+  figure.is_more = more < less;
+}
+
+template <class Figure>
+std::vector<double> values_of(const std::vector<Jobs> &samples, Figure figure) {
+  std::vector<double> values;
+  for (const Jobs &sample : samples) values.push_back(figure(sample));
+  return values;
+}
+
+void compare_rows(DifferenceRow &row, bool of_runs, double tolerance) {
+  const std::vector<Jobs> a = samples_of(*row.a, of_runs);
+  const std::vector<Jobs> b = samples_of(*row.b, of_runs);
+  Jobs all_a;
+  Jobs all_b;
+  for (const Jobs &sample : a) add(all_a, sample);
+  for (const Jobs &sample : b) add(all_b, sample);
+  for (Jobs *all : {&all_a, &all_b}) std::sort(all->responses.begin(), all->responses.end());
+  row.miss_ratio.a = miss_ratio(all_a);
+  row.miss_ratio.b = miss_ratio(all_b);
+  const bool is_enough = std::min(a.size(), b.size()) >= (of_runs ? kFewestRuns : kFewestStretches);
+  if (is_enough) test(values_of(a, miss_ratio), values_of(b, miss_ratio), 0, row.miss_ratio);
+  for (std::size_t p = 0; p < kPercents.size(); ++p) {
+    FigureDifference &figure = row.responses[p];
+    figure.a = response(all_a, kPercents[p]);
+    figure.b = response(all_b, kPercents[p]);
+    const auto has_beyond = [&](const Jobs &jobs) {
+      return static_cast<double>(jobs.responses.size()) * (100 - kPercents[p]) >= 100;
+    };
+    if (!is_enough || !std::all_of(a.begin(), a.end(), has_beyond) || !std::all_of(b.begin(), b.end(), has_beyond)) {
+      continue;
+    }
+    const auto at = [&](const Jobs &jobs) { return response(jobs, kPercents[p]); };
+    test(values_of(a, at), values_of(b, at), tolerance, figure);
+  }
+}
+
+template <class Visit>
+void for_each_figure(std::vector<DifferenceRow> &rows, Visit visit) {
+  for (DifferenceRow &row : rows) {
+    visit(row.miss_ratio);
+    for (FigureDifference &figure : row.responses) visit(figure);
+  }
 }
 
 }  // namespace
@@ -76,10 +152,10 @@ void DifferenceSide::begin_run(const trace::RunInfo &run) {
   runs_.push_back(run);
   const Time begin = run.start + run.warm_up;
   const Duration length = std::max<Duration>(1, run.end - begin);
-  const Duration block = block_length(length, longest_period(run.workload));
-  const auto blocks = static_cast<std::size_t>(std::max<Duration>(1, length / block));
-  for (Row &row : rows_) row.runs.emplace_back(blocks);
-  counting_.emplace(Counting{metrics::JobFolder(run.workload), begin, block});
+  const Duration stretch = stretch_length(length, longest_period(run.workload));
+  const auto stretches = static_cast<std::size_t>(std::max<Duration>(1, length / stretch));
+  for (Row &row : rows_) row.runs.emplace_back(stretches);
+  counting_.emplace(Counting{metrics::JobFolder(run.workload), begin, stretch});
 }
 
 void DifferenceSide::add_events(std::span<const JobEvent> events) {
@@ -100,15 +176,15 @@ void DifferenceSide::add(const trace::Trace &trace) {
 
 void DifferenceSide::count(const metrics::JobRecord &job) {
   if (job.release < counting_->begin) return;
-  const std::size_t blocks = rows_.front().runs.back().size();
-  const auto block = static_cast<std::size_t>((job.release - counting_->begin) / counting_->block);
-  const std::size_t at = std::min(blocks - 1, block);
+  const std::size_t stretches = rows_.front().runs.back().size();
+  const auto stretch = static_cast<std::size_t>((job.release - counting_->begin) / counting_->stretch);
+  const std::size_t at = std::min(stretches - 1, stretch);
   const metrics::Miss miss = metrics::miss_of(job, runs_.back().end);
   const Places &places = places_[job.task.value];
   for (const std::size_t index : {std::size_t{0}, places.dag, places.task}) {
     Row &row = rows_[index];
     row.jobs.count(job, miss);
-    Block &here = row.runs.back()[at];
+    Jobs &here = row.runs.back()[at];
     ++here.released;
     if (miss != metrics::Miss::None) ++here.missed;
   }
@@ -122,56 +198,86 @@ void DifferenceSide::count(const metrics::JobRecord &job) {
 }
 
 bool DifferenceSide::Row::has_responses() const {
-  return std::any_of(runs.begin(), runs.end(), [](const std::vector<Block> &run) {
-    return std::any_of(run.begin(), run.end(), [](const Block &block) { return !block.responses.empty(); });
+  return std::any_of(runs.begin(), runs.end(), [](const std::vector<Jobs> &run) {
+    return std::any_of(run.begin(), run.end(), [](const Jobs &stretch) { return !stretch.responses.empty(); });
   });
+}
+
+bool DifferenceRow::is_any(Verdict verdict) const {
+  const auto is_it = [verdict](const FigureDifference &figure) { return figure.verdict == verdict; };
+  return is_it(miss_ratio) || std::any_of(responses.begin(), responses.end(), is_it);
 }
 
 bool Difference::is_any(Verdict verdict) const {
   return std::any_of(rows.begin(), rows.end(), [&](const DifferenceRow &row) { return row.is_any(verdict); });
 }
 
-Difference compare_sides(const DifferenceSide &a, const DifferenceSide &b, const BootstrapOptions &options) {
+Difference compare_sides(const DifferenceSide &a, const DifferenceSide &b, double tolerance) {
   REDAG_CHECK(!a.runs().empty() && !b.runs().empty(), "a side without runs");
   Difference difference;
+  difference.of_runs = std::min(a.runs().size(), b.runs().size()) >= kFewestRuns;
+  const auto find_in = [](const DifferenceSide &side, const DifferenceSide::Row &wanted) {
+    const auto found =
+        std::find_if(side.rows().begin(), side.rows().end(), [&](const auto &row) { return is_row(row, wanted); });
+    return found == side.rows().end() ? nullptr : &*found;
+  };
   for (const DifferenceSide::Row &row : a.rows()) {
-    const auto other =
-        std::find_if(b.rows().begin(), b.rows().end(), [&](const auto &candidate) { return is_row(row, candidate); });
-    if (other == b.rows().end()) {
-      difference.missing.push_back(name_of(row));
+    if (const DifferenceSide::Row *other = find_in(b, row)) {
+      compare_rows(difference.rows.emplace_back(DifferenceRow{&row, other, {}, {}}), difference.of_runs, tolerance);
     } else {
-      difference.rows.push_back(DifferenceRow{&row, &*other, {}});
+      difference.missing.push_back(name_of(row));
     }
   }
   for (const DifferenceSide::Row &row : b.rows()) {
-    const bool known =
-        std::any_of(a.rows().begin(), a.rows().end(), [&](const auto &other) { return is_row(row, other); });
-    if (!known) difference.missing.push_back(name_of(row));
+    if (find_in(a, row) == nullptr) difference.missing.push_back(name_of(row));
   }
-
-  std::vector<DifferenceRow> &rows = difference.rows;
-  tbb::parallel_for(std::size_t{0}, rows.size(), [&](std::size_t i) {
-    BootstrapOptions row_options = options;
-    row_options.seed = mix(options.seed ^ mix(i));
-    rows[i].figures = compare_blocks(rows[i].a->runs, rows[i].b->runs, row_options);
-  });
 
   std::vector<double> p_values;
-  for (const DifferenceRow &row : rows) {
-    for (const FigureDifference *figure :
-         {&row.figures.miss_ratio, &row.figures.p50, &row.figures.p95, &row.figures.p99}) {
-      if (figure->tested) p_values.push_back(figure->p());
-    }
-  }
+  for_each_figure(difference.rows, [&](const FigureDifference &figure) {
+    if (figure.p) p_values.push_back(*figure.p);
+  });
   difference.tests = p_values.size();
   difference.threshold = discovery_threshold(std::move(p_values));
-  for (DifferenceRow &row : rows) {
-    row.miss = verdict_of(row.figures.miss_ratio, difference.threshold);
-    row.p50 = verdict_of(row.figures.p50, difference.threshold);
-    row.p95 = verdict_of(row.figures.p95, difference.threshold);
-    row.p99 = verdict_of(row.figures.p99, difference.threshold);
-  }
+  for_each_figure(difference.rows, [&](FigureDifference &figure) {
+    if (!figure.p) return;
+    const bool differs = *figure.p <= difference.threshold;
+    figure.verdict = !differs ? Verdict::Same : figure.is_more ? Verdict::Worse : Verdict::Better;
+  });
   return difference;
+}
+
+double p_larger(std::span<const double> a, std::span<const double> b) {
+  std::vector<std::pair<double, bool>> values;  // with "is of b"
+  for (const double value : a) values.emplace_back(value, false);
+  for (const double value : b) values.emplace_back(value, true);
+  std::sort(values.begin(), values.end());
+  const auto n = static_cast<double>(values.size());
+  double ranks_of_b = 0;  // the sum; equal values have their mean rank
+  double ties = 0;
+  for (std::size_t i = 0; i < values.size();) {
+    std::size_t end = i;
+    double of_b = 0;
+    for (; end < values.size() && values[end].first == values[i].first; ++end) of_b += values[end].second ? 1 : 0;
+    const auto equal = static_cast<double>(end - i);
+    ranks_of_b += of_b * (static_cast<double>(i + end) + 1) / 2;
+    ties += equal * equal * equal - equal;
+    i = end;
+  }
+  const auto size_a = static_cast<double>(a.size());
+  const auto size_b = static_cast<double>(b.size());
+  const double above_mean = ranks_of_b - size_b * (n + 1) / 2;
+  const double variance = size_a * size_b / 12 * (n + 1 - ties / (n * (n - 1)));
+  if (variance <= 0) return 1;  // all values are equal
+  return std::erfc((above_mean - 0.5) / std::sqrt(2 * variance)) / 2;
+}
+
+double discovery_threshold(std::vector<double> p_values, double rate) {
+  std::sort(p_values.begin(), p_values.end());
+  const auto n = static_cast<double>(p_values.size());
+  for (std::size_t k = p_values.size(); k > 0; --k) {
+    if (p_values[k - 1] <= rate * static_cast<double>(k) / n) return p_values[k - 1];
+  }
+  return 0;
 }
 
 }  // namespace redag::lab

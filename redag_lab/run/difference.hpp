@@ -1,11 +1,12 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Compares two sides of runs row by row (each task, each DAG, all jobs): figures, intervals, and which differences
-// exceed chance (block_bootstrap.hpp). Rows are matched by name. Runs in parallel; the answer is the same for any
-// number of processors.
+// Compares two sides of runs row by row (each task, each DAG, all jobs) and says which figures differ by more than
+// chance. Rows are matched by name. Pure functions.
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
@@ -14,9 +15,15 @@
 #include "redag/trace/trace.hpp"
 #include "redag_analysis/metrics/jobs.hpp"
 #include "redag_analysis/metrics/summary.hpp"
-#include "redag_lab/run/block_bootstrap.hpp"
 
 namespace redag::lab {
+
+/// A run is cut into this many stretches of time, or into fewer of at least two longest periods each.
+inline constexpr Duration kStretches = 10;
+/// The fewest runs of each side of which whole runs are compared; of fewer, their stretches are.
+inline constexpr std::size_t kFewestRuns = 5;
+/// The fewest stretches of each side that allow a test.
+inline constexpr std::size_t kFewestStretches = 8;
 
 /// The runs of one side. All runs have the same task names.
 class DifferenceSide {
@@ -31,6 +38,13 @@ class DifferenceSide {
 
   [[nodiscard]] const std::vector<trace::RunInfo> &runs() const { return runs_; }
 
+  /// The jobs that were released in one stretch of a run, or in several.
+  struct Jobs {
+    std::uint64_t released = 0;
+    std::uint64_t missed = 0;
+    std::vector<Duration> responses;  // of the jobs that finished
+  };
+
   struct Row {
     std::string dag;   // empty: all DAGs together
     std::string task;  // empty: the whole DAG
@@ -38,7 +52,7 @@ class DifferenceSide {
     /// For a task the largest f - r; for a DAG with one sink the largest f - origin there (end to end). It is 0 if none
     /// finished, and for rows without a response of their own: all DAGs together, or a DAG with several sinks.
     Duration max = 0;
-    BlockedRuns runs;  // with the responses that `max` refers to
+    std::vector<std::vector<Jobs>> runs;  // by run, then by stretch; with the responses that `max` refers to
 
     [[nodiscard]] bool has_responses() const;
   };
@@ -56,7 +70,7 @@ class DifferenceSide {
   struct Counting {
     metrics::JobFolder folder;
     Time begin = 0;
-    Duration block = 0;
+    Duration stretch = 0;
   };
 
   void make_rows(const Workload &workload);
@@ -77,32 +91,47 @@ enum class Verdict : std::uint8_t {
 
 [[nodiscard]] const char *to_string(Verdict verdict);
 
+struct FigureDifference {
+  double a = 0;
+  double b = 0;
+  std::optional<double> p;  // two-sided; nothing: the data do not suffice for a test
+  bool is_more = false;     // with p: B is larger rather than smaller
+  Verdict verdict = Verdict::NotTested;
+};
+
 struct DifferenceRow {
   const DifferenceSide::Row *a = nullptr;
   const DifferenceSide::Row *b = nullptr;
-  RowDifference figures;
-  Verdict miss = Verdict::NotTested;
-  Verdict p50 = Verdict::NotTested;
-  Verdict p95 = Verdict::NotTested;
-  Verdict p99 = Verdict::NotTested;
+  FigureDifference miss_ratio;
+  std::array<FigureDifference, 3> responses;  // p50, p95, p99 in ns
 
-  [[nodiscard]] bool is_any(Verdict verdict) const {
-    return miss == verdict || p50 == verdict || p95 == verdict || p99 == verdict;
-  }
-  [[nodiscard]] bool is_correlated() const { return figures.block_correlation > figures.correlation_limit; }
+  [[nodiscard]] bool is_any(Verdict verdict) const;
 };
 
 struct Difference {
   std::vector<DifferenceRow> rows;   // rows that both sides have, in the order of A
   std::vector<std::string> missing;  // rows that only one side has
+  bool of_runs = false;              // whole runs were compared, and not stretches of them
   std::size_t tests = 0;
   double threshold = 0;  // the largest p-value that counts, over all tests together
 
   [[nodiscard]] bool is_any(Verdict verdict) const;
 };
 
-/// Compares the sides. The result refers to `a` and `b`. Requires at least one run on each side.
-[[nodiscard]] Difference compare_sides(const DifferenceSide &a, const DifferenceSide &b,
-                                       const BootstrapOptions &options);
+/// Compares the sides. Misses come in bursts: a test that takes jobs for independent would find differences where there
+/// are none. The samples are therefore the figures of whole runs or, of fewer than kFewestRuns, those of stretches that
+/// are long against the periods (batch means: B. Schmeiser, Operations Research 30(3), 1982). Response percentiles that
+/// differ by no more than the share `tolerance` of A's count as equal; one job of each sample has to be beyond the
+/// percentile. The result refers to `a` and `b`. Requires at least one run on each side.
+[[nodiscard]] Difference compare_sides(const DifferenceSide &a, const DifferenceSide &b, double tolerance);
+
+/// Returns the one-sided p-value of "values of `b` tend to be larger than those of `a`", by the rank-sum test with the
+/// normal approximation, corrected for ties and continuity (H. Mann, D. Whitney, Annals of Mathematical Statistics
+/// 18(1), 1947).
+[[nodiscard]] double p_larger(std::span<const double> a, std::span<const double> b);
+
+/// Returns the largest of these p-values that is a discovery at a false discovery rate of `rate` (Y. Benjamini, Y.
+/// Hochberg, Journal of the Royal Statistical Society B 57(1), 1995); 0 if none is.
+[[nodiscard]] double discovery_threshold(std::vector<double> p_values, double rate = 0.05);
 
 }  // namespace redag::lab

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "redag/base/rng.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/sim/simulator.hpp"
 #include "tests/testing/builders.hpp"
@@ -57,11 +58,7 @@ DifferenceSide side(sched::Preemption mode, std::uint64_t seed, int runs = 2, co
   return made;
 }
 
-BootstrapOptions quick() {
-  BootstrapOptions options;
-  options.replicates = 500;
-  return options;
-}
+constexpr double kTolerance = 0.05;
 
 TEST(Difference, RowsAreAllJobsThenDagsWithTheirTasks) {
   const DifferenceSide a = side(sched::Preemption::None, 1, 1);
@@ -70,16 +67,16 @@ TEST(Difference, RowsAreAllJobsThenDagsWithTheirTasks) {
   EXPECT_THAT(names, ElementsAre("/", "a/", "a/fast", "b/", "b/slow", "b/after"));
   EXPECT_EQ(a.rows()[0].jobs.released, a.rows()[1].jobs.released + a.rows()[3].jobs.released);
   EXPECT_EQ(a.rows()[1].jobs.released, 2000U);
-  EXPECT_EQ(a.rows()[2].runs.at(0).size(), 28U);  // of 700 ms
-  std::uint64_t in_blocks = 0;
-  for (const Block &block : a.rows()[2].runs[0]) in_blocks += block.released;
-  EXPECT_EQ(in_blocks, 2000U);
+  EXPECT_EQ(a.rows()[2].runs.at(0).size(), 10U);  // of 2 s
+  std::uint64_t in_stretches = 0;
+  for (const DifferenceSide::Jobs &stretch : a.rows()[2].runs[0]) in_stretches += stretch.released;
+  EXPECT_EQ(in_stretches, 2000U);
 }
 
 TEST(Difference, CountsAsTheSummaryDoes) {
   const DifferenceSide a = side(sched::Preemption::None, 1, 1);
   std::uint64_t missed = 0;
-  for (const Block &block : a.rows()[2].runs[0]) missed += block.missed;
+  for (const DifferenceSide::Jobs &stretch : a.rows()[2].runs[0]) missed += stretch.missed;
   EXPECT_EQ(missed, a.rows()[2].jobs.missed());
   EXPECT_GT(missed, 100U);  // without preemption, 24 ms delay a task with a period of 10 ms
 }
@@ -88,7 +85,7 @@ TEST(Difference, ADagAnswersEndToEndAndAllJobsTogetherDoNot) {
   const DifferenceSide a = side(sched::Preemption::None, 1, 1);
   const auto responses = [](const DifferenceSide::Row &row) {
     std::size_t count = 0;
-    for (const Block &block : row.runs[0]) count += block.responses.size();
+    for (const DifferenceSide::Jobs &stretch : row.runs[0]) count += stretch.responses.size();
     return count;
   };
   EXPECT_EQ(responses(a.rows()[0]), 0U);
@@ -114,15 +111,15 @@ TEST(Difference, WarmUpIsNotCounted) {
 TEST(Difference, PreemptionIsBetterForTheFastTaskAlone) {
   const DifferenceSide a = side(sched::Preemption::None, 1);
   const DifferenceSide b = side(sched::Preemption::Full, 1);
-  const Difference there = compare_sides(a, b, quick());
+  const Difference there = compare_sides(a, b, kTolerance);
   ASSERT_EQ(there.rows.size(), 6U);
-  EXPECT_EQ(there.rows[2].miss, Verdict::Better);
-  EXPECT_EQ(there.rows[2].p95, Verdict::Better);
-  EXPECT_EQ(there.rows[4].p95, Verdict::Worse);
+  EXPECT_EQ(there.rows[2].miss_ratio.verdict, Verdict::Better);
+  EXPECT_EQ(there.rows[2].responses[1].verdict, Verdict::Better);
+  EXPECT_EQ(there.rows[4].responses[0].verdict, Verdict::Worse);
   EXPECT_TRUE(there.is_any(Verdict::Worse));
-  const Difference back = compare_sides(b, a, quick());
-  EXPECT_EQ(back.rows[2].miss, Verdict::Worse);
-  EXPECT_EQ(back.rows[4].p95, Verdict::Better);
+  const Difference back = compare_sides(b, a, kTolerance);
+  EXPECT_EQ(back.rows[2].miss_ratio.verdict, Verdict::Worse);
+  EXPECT_EQ(back.rows[4].responses[0].verdict, Verdict::Better);
 }
 
 TEST(Difference, OtherSeedsOfTheSameAreTheSame) {
@@ -130,7 +127,7 @@ TEST(Difference, OtherSeedsOfTheSameAreTheSame) {
   for (std::uint64_t i = 0; i < 8; ++i) {
     const DifferenceSide a = side(sched::Preemption::None, 100 + 10 * i);
     const DifferenceSide b = side(sched::Preemption::None, 105 + 10 * i);
-    const Difference difference = compare_sides(a, b, quick());
+    const Difference difference = compare_sides(a, b, kTolerance);
     differing += difference.is_any(Verdict::Better) || difference.is_any(Verdict::Worse) ? 1 : 0;
   }
   EXPECT_LE(differing, 2);
@@ -138,7 +135,7 @@ TEST(Difference, OtherSeedsOfTheSameAreTheSame) {
 
 TEST(Difference, RowsOfOneSideAreNamed) {
   const Difference difference =
-      compare_sides(side(sched::Preemption::None, 1), side(sched::Preemption::None, 1, 2, "c"), quick());
+      compare_sides(side(sched::Preemption::None, 1), side(sched::Preemption::None, 1, 2, "c"), kTolerance);
   EXPECT_THAT(difference.missing, ElementsAre("b", "b.slow", "b.after", "c", "c.slow", "c.after"));
   EXPECT_EQ(difference.rows.size(), 3U);
 }
@@ -148,9 +145,63 @@ TEST(Difference, ShortRunsAreNotTested) {
   a.add(run_of(contention(), sched::Preemption::None, 1, kSecond));
   DifferenceSide b;
   b.add(run_of(contention(), sched::Preemption::Full, 1, kSecond));
-  const Difference difference = compare_sides(a, b, quick());  // 5 blocks of 200 ms
+  const Difference difference = compare_sides(a, b, kTolerance);  // 5 stretches of 200 ms
   EXPECT_EQ(difference.tests, 0U);
-  EXPECT_EQ(difference.rows[2].miss, Verdict::NotTested);
+  EXPECT_EQ(difference.rows[2].miss_ratio.verdict, Verdict::NotTested);
+}
+
+TEST(Difference, OfManyRunsWholeOnesAreCompared) {
+  const DifferenceSide a = side(sched::Preemption::None, 1, 5);
+  const DifferenceSide b = side(sched::Preemption::Full, 11, 5);
+  const Difference difference = compare_sides(a, b, kTolerance);
+  EXPECT_TRUE(difference.of_runs);
+  EXPECT_EQ(difference.rows[2].miss_ratio.verdict, Verdict::Better);
+  EXPECT_FALSE(compare_sides(a, side(sched::Preemption::Full, 11, 4), kTolerance).of_runs);
+}
+
+TEST(RankSum, KnownValues) {
+  // U = 0 of 5 and 5: the exact p is 1 / 252 = 0.0040, and the approximation with continuity says 0.0061.
+  EXPECT_NEAR(p_larger(std::vector<double>{1, 2, 3, 4, 5}, std::vector<double>{6, 7, 8, 9, 10}), 0.0061, 0.0001);
+  EXPECT_GT(p_larger(std::vector<double>{6, 7, 8, 9, 10}, std::vector<double>{1, 2, 3, 4, 5}), 0.99);
+  EXPECT_NEAR(p_larger(std::vector<double>{1, 3}, std::vector<double>{2, 2}), 0.64, 0.05);
+  EXPECT_EQ(p_larger(std::vector<double>{3, 3}, std::vector<double>{3, 3, 3}), 1) << "all are equal";
+}
+
+// Misses in bursts of 20 jobs on average, in stretches of 300 jobs: equal sides differ about as often as the test says,
+// and one burst is one event.
+TEST(RankSum, BurstsOfMisses) {
+  const auto shares = [](std::uint64_t seed, double begin) {
+    Rng rng(seed);
+    std::vector<double> stretches(10);
+    bool burst = false;
+    for (double &share : stretches) {
+      for (int job = 0; job < 300; ++job) {
+        if (rng.uniform01() < (burst ? 0.05 : begin)) burst = !burst;
+        share += burst ? 1.0 / 300 : 0;
+      }
+    }
+    return stretches;
+  };
+  int equal = 0;
+  int fewer = 0;
+  constexpr int kTrials = 400;
+  for (std::uint64_t i = 0; i < kTrials; ++i) {
+    const std::vector<double> a = shares(mix(2 * i), 0.005);
+    equal += p_larger(a, shares(mix(2 * i + 1), 0.005)) <= 0.05 ? 1 : 0;
+    fewer += p_larger(shares(mix(2 * i + 1), 0.0005), a) <= 0.05 ? 1 : 0;
+  }
+  EXPECT_LE(equal, kTrials * 8 / 100);
+  EXPECT_GE(equal, kTrials / 100) << "a test that never speaks";
+  EXPECT_GE(fewer, kTrials * 8 / 10);
+  std::vector<double> one_burst(10);
+  one_burst[7] = 0.6;
+  EXPECT_GT(p_larger(std::vector<double>(10), one_burst), 0.1);
+}
+
+TEST(DiscoveryThreshold, OfBenjaminiAndHochberg) {
+  EXPECT_EQ(discovery_threshold({}), 0);
+  EXPECT_EQ(discovery_threshold({0.2, 0.9}), 0);
+  EXPECT_DOUBLE_EQ(discovery_threshold({0.9, 0.01, 0.03, 0.02}), 0.03);
 }
 
 }  // namespace

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <limits>
 #include <numeric>
 #include <tuple>
@@ -173,122 +172,33 @@ TestChoice order_free_test(const Workload &workload, const analysis::AnalysisPla
   return {std::move(test), {}};
 }
 
-Orders all_orders(const analysis::TaskSet &task_set) {
-  Orders orders;
-  for (const std::uint32_t unit : deadline_order(task_set)) orders.chains.push_back({{unit}});
-  return orders;
-}
-
-namespace {
-
-class LowestFirst {
- public:
-  LowestFirst(const Workload &workload, const analysis::AnalysisPlatform &platform, const OrderFreeTest &test,
-              Orders orders, const Badness &badness)
-      : workload_(workload), platform_(platform), test_(test), orders_(std::move(orders)), badness_(badness) {
-    Result<analysis::TaskSet> before = analysis::compile(workload, platform);
-    REDAG_CHECK(before.has_value(), "audsley() needs a valid workload");
-    before_ = *std::move(before);
-  }
-
-  std::optional<AudsleyResult> run(const std::function<bool()> &stop) {
-    while (drop_empty_chains()) {
-      std::optional<Trial> best;
-      for (auto chain = orders_.chains.rbegin(); chain != orders_.chains.rend(); ++chain) {
-        if (stop && stop()) return std::nullopt;
-        Trial trial = tried(*chain);
-        // Of equally good blocks, the longest deadline gets the place.
-        if (!best || std::tuple(trial.late, -trial.longest) < std::tuple(best->late, -best->longest)) best = trial;
-      }
-      note(*best, orders_.chains.size());
-      const UnitBlock &block = best->chain->back();
-      result_.order.insert(result_.order.begin(), block.begin(), block.end());
-      best->chain->pop_back();
+std::optional<UnitOrder> audsley(const Workload &workload, const analysis::AnalysisPlatform &platform,
+                                 const OrderFreeTest &test, const Badness &badness, const std::function<bool()> &stop) {
+  const Result<analysis::TaskSet> before = analysis::compile(workload, platform);
+  REDAG_CHECK(before.has_value(), "audsley() needs a valid workload");
+  UnitOrder open = deadline_order(*before);
+  UnitOrder placed;
+  while (!open.empty()) {
+    std::optional<std::size_t> best;
+    double least_late = 0;
+    // Begins with the longest deadline, which gets the place among equally late units.
+    for (std::size_t i = open.size(); i-- > 0;) {
+      if (stop && stop()) return std::nullopt;
+      UnitOrder order = open;
+      std::rotate(order.begin() + static_cast<std::ptrdiff_t>(i), order.begin() + static_cast<std::ptrdiff_t>(i) + 1,
+                  order.end());
+      order.insert(order.end(), placed.begin(), placed.end());
+      const std::optional<Duration> response = test.response(compiled(workload, platform, *before, order), open[i]);
+      const double late =
+          response ? badness(*response, due_of(before->units[open[i]])) : std::numeric_limits<double>::infinity();
+      if (best && late >= least_late) continue;
+      best = i;
+      least_late = late;
     }
-    for (auto unit = orders_.first.rbegin(); unit != orders_.first.rend(); ++unit) {
-      const UnitOrder more_urgent(orders_.first.begin(), unit.base() - 1);
-      UnitOrder others(unit.base(), orders_.first.end());
-      others.insert(others.end(), result_.order.begin(), result_.order.end());
-      note(judged(*unit, more_urgent, others), 1);
-    }
-    result_.order.insert(result_.order.begin(), orders_.first.begin(), orders_.first.end());
-    return std::move(result_);
+    placed.insert(placed.begin(), open[*best]);
+    open.erase(open.begin() + static_cast<std::ptrdiff_t>(*best));
   }
-
- private:
-  // The last block of a chain at the lowest place that is left.
-  struct Trial {
-    std::vector<UnitBlock> *chain = nullptr;
-    double late = -std::numeric_limits<double>::infinity();
-    Duration longest = 0;  // deadline
-    Unplaced worst;
-    bool fits = true;
-  };
-
-  // Returns true if a chain is left.
-  bool drop_empty_chains() {
-    std::erase_if(orders_.chains, [](const std::vector<UnitBlock> &chain) { return chain.empty(); });
-    return !orders_.chains.empty();
-  }
-
-  Trial tried(std::vector<UnitBlock> &chain) const {
-    UnitOrder open = orders_.first;
-    for (const std::vector<UnitBlock> &each : orders_.chains) {
-      for (const UnitBlock &block : each) {
-        if (&block != &chain.back()) open.insert(open.end(), block.begin(), block.end());
-      }
-    }
-    Trial trial;
-    for (const std::uint32_t unit : chain.back()) {
-      UnitOrder more_urgent = open;
-      std::copy_if(chain.back().begin(), chain.back().end(), std::back_inserter(more_urgent),
-                   [unit](std::uint32_t each) { return each != unit; });
-      const Trial of_unit = judged(unit, more_urgent, result_.order);
-      trial.fits = trial.fits && of_unit.fits;
-      trial.longest = std::max(trial.longest, of_unit.longest);
-      if (of_unit.late <= trial.late) continue;
-      trial.late = of_unit.late;
-      trial.worst = of_unit.worst;
-    }
-    trial.chain = &chain;
-    return trial;
-  }
-
-  // Tests one unit between these.
-  [[nodiscard]] Trial judged(std::uint32_t unit, UnitOrder order, const UnitOrder &less_urgent) const {
-    order.push_back(unit);
-    order.insert(order.end(), less_urgent.begin(), less_urgent.end());
-    const Duration due = due_of(before_.units[unit]);
-    const std::optional<Duration> response = test_.response(compiled(workload_, platform_, before_, order), unit);
-    Trial trial;
-    trial.late = response ? badness_(*response, due) : std::numeric_limits<double>::infinity();
-    trial.longest = due;
-    trial.worst = Unplaced{.unit = unit, .response = response, .due = due};
-    trial.fits = response && *response <= due;
-    return trial;
-  }
-
-  void note(const Trial &trial, std::size_t rivals) {
-    if (trial.fits || result_.failure) return;
-    result_.failure = trial.worst;
-    result_.failure->rivals = rivals;
-  }
-
-  const Workload &workload_;
-  const analysis::AnalysisPlatform &platform_;
-  const OrderFreeTest &test_;
-  Orders orders_;  // what is not placed yet
-  const Badness &badness_;
-  analysis::TaskSet before_;
-  AudsleyResult result_;
-};
-
-}  // namespace
-
-std::optional<AudsleyResult> audsley(const Workload &workload, const analysis::AnalysisPlatform &platform,
-                                     const OrderFreeTest &test, Orders orders, const Badness &badness,
-                                     const std::function<bool()> &stop) {
-  return LowestFirst(workload, platform, test, std::move(orders), badness).run(stop);
+  return placed;
 }
 
 }  // namespace redag::lab

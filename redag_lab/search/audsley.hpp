@@ -56,41 +56,14 @@ struct TestChoice {
 };
 [[nodiscard]] TestChoice order_free_test(const Workload &workload, const analysis::AnalysisPlatform &platform);
 
-/// Units that stay neighbours, most urgent first.
-using UnitBlock = UnitOrder;
-
-/// The orders among which audsley() searches. Each unit is in `first` or in one block.
-struct Orders {
-  UnitOrder first;                             // before all others, in this order
-  std::vector<std::vector<UnitBlock>> chains;  // blocks that keep their order, most urgent first
-};
-
-/// All orders: each unit is a chain of its own.
-[[nodiscard]] Orders all_orders(const analysis::TaskSet &task_set);
-
 /// Rates a response against its deadline; smaller is better.
 using Badness = std::function<double(Duration response, Duration due)>;
 
-/// A unit that misses its deadline under the test where it is.
-struct Unplaced {
-  std::uint32_t unit = 0;
-  std::optional<Duration> response;  // nothing: no bound
-  Duration due = 0;
-  std::size_t rivals = 0;  // blocks that could have had its place; none of them would keep its deadlines there
-};
-
-struct AudsleyResult {
-  UnitOrder order;
-  std::optional<Unplaced> failure;  // the least urgent; nothing: every unit keeps its deadline under the test
-};
-
-/// Fills priorities from the lowest up. Each goes to the block whose worst unit is least late there; among equals, to
-/// the one with the longest deadline. Every unit of a block is tested as the least urgent of it. With an optimal test,
-/// blocks of one unit and nothing in `first`, the result has the smallest largest lateness of all these orders: if the
-/// last block of a chain can have the lowest priority, moving it there keeps all chains in order, and others only move
-/// up. Returns nothing if `stop` ended it. O(n^2) tests.
-[[nodiscard]] std::optional<AudsleyResult> audsley(const Workload &workload, const analysis::AnalysisPlatform &platform,
-                                                   const OrderFreeTest &test, Orders orders, const Badness &badness,
-                                                   const std::function<bool()> &stop = {});
+/// Fills priorities from the lowest up. Each place goes to the unit that is least late there; among equals, to the one
+/// with the longest deadline. With an optimal test, the result has the smallest largest lateness of all orders. Returns
+/// nothing if `stop` ended it. O(n^2) tests.
+[[nodiscard]] std::optional<UnitOrder> audsley(const Workload &workload, const analysis::AnalysisPlatform &platform,
+                                               const OrderFreeTest &test, const Badness &badness,
+                                               const std::function<bool()> &stop = {});
 
 }  // namespace redag::lab

@@ -30,48 +30,32 @@ bool is_overloaded(const analysis::TaskSet &task_set) {
   return sum > Int128{task_set.platform.workers} << kBits;
 }
 
-std::string why_no_bound(const analysis::Report &report, std::uint32_t task) {
-  for (const analysis::MethodReport &method : report.methods) {
-    const analysis::Bound *bound = method.bound();
-    if (!method.trusted || bound == nullptr || task >= bound->tasks.size()) continue;
-    if (!bound->tasks[task].absent.empty()) return std::string(bound->tasks[task].absent);
-  }
-  return "no method that bounds response times applies";
-}
-
-struct Obstacle {
-  std::string what;
-  std::string reason = {};
-};
-
 // Returns why analyze() does not accept the workload.
-Obstacle obstacle_of(const Workload &workload, const analysis::AnalysisPlatform &platform) {
+std::string obstacle_of(const Workload &workload, const analysis::AnalysisPlatform &platform) {
   const Result<analysis::TaskSet> task_set = analysis::compile(workload, platform);
-  if (!task_set) return {task_set.error().front().message};
-  if (!task_set->not_analysable.empty() && !task_set->has_waits) {
-    return {"no method applies", task_set->not_analysable};
-  }
-  if (const std::optional<std::string> why = why_impossible(*task_set)) return {*why};
+  if (!task_set) return task_set.error().front().message;
+  if (!task_set->not_analysable.empty() && !task_set->has_waits) return "no method applies";
+  if (const std::optional<std::string> why = why_impossible(*task_set)) return *why;
   const analysis::Report report = analysis::analyze(*task_set);
   std::optional<std::uint32_t> worst;
   Duration missing = 0;
   for (std::uint32_t t = 0; t < task_set->tasks.size(); ++t) {
     const analysis::CompiledTask &task = task_set->tasks[t];
     if (meets_deadline(task, report.tasks[t].bound)) continue;
-    if (!report.tasks[t].response) return {task_set->tasks[t].name + " has no bound", why_no_bound(report, t)};
+    if (!report.tasks[t].response) return task.name + " has no bound";
     const Duration late = *report.tasks[t].response - std::min(task.deadline, task.limit);
     if (worst && late <= missing) continue;
     worst = t;
     missing = late;
   }
-  if (worst) return {"the bound of " + task_set->tasks[*worst].name + " exceeds its deadline"};
+  if (worst) return "the bound of " + task_set->tasks[*worst].name + " exceeds its deadline";
   for (std::size_t d = 0; d < task_set->dags.size(); ++d) {
     const analysis::CompiledDag &dag = task_set->dags[d];
     if (dag.deadline > 0 && report.dags[d].response.value_or(kNever) > dag.deadline) {
-      return {"the end-to-end deadline of " + dag.name};
+      return "the end-to-end deadline of " + dag.name;
     }
   }
-  return {"not accepted"};
+  return "not accepted";
 }
 
 // Searches the positions of one knob.
@@ -106,27 +90,21 @@ class SensitivitySearch {
     } else if (const std::optional<std::int64_t> start = light_start(); start && !stopped_) {
       between(*start, margin_.nominal);
     } else {
-      set_obstacle(obstacle_of(turned(workload_, margin_.knob, lightest()), platform_));
+      margin_.obstacle = obstacle_of(turned(workload_, margin_.knob, lightest()), platform_);
     }
     if (stopped_) return std::nullopt;
     if (margin_.position) {
       margin_.factor = load_factor(workload_, margin_.knob, *margin_.position);
       const bool at_end = margin_.knob.kind == Knob::Kind::Period && *margin_.position == -1;
-      set_obstacle(at_end ? Obstacle{"the resolution of the clock"}
-                          : obstacle_of(turned(workload_, margin_.knob, *margin_.position + 1), platform_));
+      margin_.obstacle = at_end ? "the resolution of the clock"
+                                : obstacle_of(turned(workload_, margin_.knob, *margin_.position + 1), platform_);
     }
     return margin_;
-  }
-
-  void set_obstacle(Obstacle obstacle) {
-    margin_.obstacle = std::move(obstacle.what);
-    margin_.reason = std::move(obstacle.reason);
   }
 
   bool accepts(std::int64_t position) {
     stopped_ = stopped_ || is_stopped();
     if (stopped_) return false;
-    ++margin_.tested;
     const Workload candidate = turned(workload_, margin_.knob, position);
     const Result<analysis::TaskSet> task_set = analysis::compile(candidate, platform_);
     return task_set && !why_impossible(*task_set) && accepts_(candidate, *task_set);
@@ -186,7 +164,6 @@ class SensitivitySearch {
     const std::vector<std::int64_t> even = spread(low, high);
     std::set<std::int64_t> positions(even.begin(), even.end());
     add_changes_of_order(low, high, positions);
-    const std::int64_t end = high;
     for (const std::int64_t position : positions) {
       if (accepts(position)) {
         low = position;
@@ -194,10 +171,6 @@ class SensitivitySearch {
         high = position;
         break;
       }
-    }
-    for (const std::int64_t position : even) {
-      if (position <= high || position >= end || margin_.again) continue;
-      if (accepts(position)) margin_.again = position;
     }
     while (high - low > 1 && !stopped_) {
       const std::int64_t middle = std::midpoint(low, high);
@@ -292,36 +265,16 @@ std::optional<Margin> margin_of(const Workload &workload, const analysis::Analys
   return SensitivitySearch(workload, platform, knob, accepts, options).run();
 }
 
-namespace {
-
-// Returns the knob of these tasks' rate: their period if they share one.
-Knob rate_of(const std::vector<TaskRef> &tasks, const std::vector<std::uint32_t> &which) {
-  const bool is_one = std::all_of(which.begin(), which.end(), [&](std::uint32_t t) {
-    return tasks[t].task->period == tasks[which.front()].task->period;
-  });
-  return Knob{is_one ? Knob::Kind::Period : Knob::Kind::Rates, which};
-}
-
-}  // namespace
-
 std::vector<Knob> knobs_of(const Workload &workload, const analysis::TaskSet &task_set) {
   const std::vector<TaskRef> tasks = flatten(workload);
   std::vector<std::uint32_t> all(tasks.size());
   std::iota(all.begin(), all.end(), 0);
   std::vector<Knob> knobs = {{Knob::Kind::AllWcets, all}, {Knob::Kind::Rates, all}};
   for (const std::uint32_t t : all) knobs.push_back({Knob::Kind::Wcet, {t}});
-  for (const analysis::CompiledDag &dag : task_set.dags) {
-    Knob knob = rate_of(tasks, dag.tasks);
-    // A workload with one DAG has that DAG's rate as the knob of all rates.
-    const bool is_there = knob.kind == Knob::Kind::Rates && knob.tasks.size() == all.size();
-    if (!is_there) knobs.push_back(std::move(knob));
-    if (dag.units.size() < 2) continue;
-    for (const std::uint32_t unit : dag.units) {
-      const std::vector<std::uint32_t> &members = task_set.units[unit].tasks;
-      // Data tasks that join several rates have no rate of their own.
-      const auto is_timer = [&](std::uint32_t t) { return tasks[t].task->activation == Activation::Timer; };
-      if (std::any_of(members.begin(), members.end(), is_timer)) knobs.push_back(rate_of(tasks, members));
-    }
+  for (const analysis::Unit &unit : task_set.units) {
+    // Data tasks that join several rates have no rate of their own.
+    const auto is_timer = [&](std::uint32_t t) { return tasks[t].task->activation == Activation::Timer; };
+    if (std::any_of(unit.tasks.begin(), unit.tasks.end(), is_timer)) knobs.push_back({Knob::Kind::Period, unit.tasks});
   }
   return knobs;
 }

@@ -24,13 +24,8 @@ struct Margin {
   Knob knob;
   std::int64_t nominal = 0;
   std::optional<std::int64_t> position;  // none: not accepted at any load that this knob leaves
-  std::optional<std::int64_t> again;     // an accepted position above `position`: not monotone
-  std::uint32_t tested = 0;              // positions
+  double factor = 0;                     // the load at `position` divided by the nominal load; 0: no position
   std::string obstacle;                  // what fails at the next position: a clause without a final full stop
-  std::string reason;                    // why, where the analysis gives a reason of its own; also such a clause
-
-  /// The load at `position` divided by the nominal load. Requires a position.
-  double factor = 0;
 };
 
 /// True if this workload, compiled for the platform, is acceptable. Called only for workloads that why_impossible()
@@ -43,8 +38,8 @@ using Accepts = std::function<bool(const Workload &, const analysis::TaskSet &)>
 }
 
 struct SensitivityOptions {
-  /// The number of evenly spread positions, tested for monotonicity, between the nominal one and the first impossible
-  /// one. Where periods determine priorities, the positions at which the order changes are tested as well.
+  /// The number of evenly spread positions that are tested before the bisection, because acceptance need not be
+  /// monotone. Where periods determine priorities, the positions at which the order changes are tested as well.
   std::uint32_t probes = 16;
   /// Called before every test; true ends the search. Null: never.
   std::function<bool()> stop;
@@ -60,8 +55,8 @@ struct SensitivityOptions {
                                               const Knob &knob, const Accepts &accepts = accepted_by_analysis,
                                               const SensitivityOptions &options = {});
 
-/// Returns the knobs of a report, in its order: all wcets, all rates, each task's wcet, and each DAG's rate (its period
-/// where it has one). A DAG with several units also has the period of each unit, after its rate.
+/// Returns the knobs of a report, in its order: all wcets, all rates, each task's wcet, and the period of each unit
+/// that has a timer.
 [[nodiscard]] std::vector<Knob> knobs_of(const Workload &workload, const analysis::TaskSet &task_set);
 
 }  // namespace redag::lab

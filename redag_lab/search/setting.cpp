@@ -4,72 +4,14 @@
 #include "redag_lab/search/setting.hpp"
 
 #include <algorithm>
-#include <map>
 #include <numeric>
 #include <set>
-#include <tuple>
 
 #include "redag/sched/policy.hpp"
 #include "redag_lab/search/audsley.hpp"
 
 namespace redag::lab {
 namespace {
-
-// Returns the value by which the policy orders tasks, larger for more urgent; nothing if it uses several values.
-std::optional<std::int64_t> urgency(const Task &task, PolicyKind policy) {
-  switch (policy) {
-    case PolicyKind::RateMonotonic: return -task.period;
-    case PolicyKind::DeadlineMonotonic: return -task.deadline;
-    case PolicyKind::Fixed: return task.priority.value_or(0);
-    case PolicyKind::ChainAware:
-    case PolicyKind::Edf:
-    case PolicyKind::Fifo: break;
-  }
-  return std::nullopt;
-}
-
-// Returns the DAGs with a task whose urgency equals that of a task of another DAG.
-std::vector<std::uint32_t> tied_dags(const Workload &workload) {
-  std::map<std::int64_t, std::set<std::uint32_t>> dags;
-  for (std::uint32_t d = 0; d < workload.dags.size(); ++d) {
-    for (const Task &task : workload.dags[d].tasks) {
-      const std::optional<std::int64_t> value = urgency(task, workload.policy);
-      if (!value) return {};
-      dags[*value].insert(d);
-    }
-  }
-  std::set<std::uint32_t> tied;
-  for (const auto &[value, sharing] : dags) {
-    if (sharing.size() > 1) tied.insert(sharing.begin(), sharing.end());
-  }
-  return {tied.begin(), tied.end()};
-}
-
-// Assigns one priority to a DAG's equally urgent tasks, which remain equal.
-void set_priorities(Workload &workload, const std::vector<std::uint32_t> &order) {
-  std::vector<std::uint32_t> place(workload.dags.size());
-  std::iota(place.begin(), place.end(), 0);
-  std::vector<std::uint32_t> positions = order;
-  std::sort(positions.begin(), positions.end());
-  for (std::size_t i = 0; i < order.size(); ++i) place[order[i]] = positions[i];
-
-  using Key = std::tuple<std::int64_t, std::uint32_t>;  // most urgent first
-  std::set<Key> keys;
-  const auto key_of = [&](std::uint32_t d, const Task &task) {
-    return Key{-*urgency(task, workload.policy), place[d]};
-  };
-  for (std::uint32_t d = 0; d < workload.dags.size(); ++d) {
-    for (const Task &task : workload.dags[d].tasks) keys.insert(key_of(d, task));
-  }
-  std::map<Key, int> priorities;
-  int priority = static_cast<int>(keys.size());
-  for (const Key &key : keys) priorities[key] = priority--;
-  for (std::uint32_t d = 0; d < workload.dags.size(); ++d) {
-    for (Task &task : workload.dags[d].tasks) {
-      task.priority = priorities.at(key_of(d, task));  // key_of() reads this task's old priority
-    }
-  }
-}
 
 // Returns the values of max_active worth trying: the present one, none, and 1 to min(tasks - 1, workers). A DAG with
 // one task has only its present value.
@@ -125,8 +67,8 @@ std::vector<NamedOrder> orders_to_try(const Workload &workload, const analysis::
     const auto late = static_cast<double>(response - due);
     return objective == Objective::Slack ? late / static_cast<double>(due) : late;
   };
-  const auto found = audsley(workload, platform, *choice.test, all_orders(*task_set), badness, stop);
-  if (found) orders.push_back({"audsley", with_order(workload, *task_set, found->order)});
+  const auto found = audsley(workload, platform, *choice.test, badness, stop);
+  if (found) orders.push_back({"audsley", with_order(workload, *task_set, *found)});
   return orders;
 }
 
@@ -146,8 +88,6 @@ SettingSpace::SettingSpace(const Workload &workload, const Freedom &freedom, std
       space_.values.push_back(usual_caps(dag, freedom.workers ? most_workers : workers));
     }
   }
-  if (freedom.ties && orders_.size() == 1) tied_ = tied_dags(workload);
-  for (std::uint32_t i = 1; i < tied_.size(); ++i) space_.values.push_back(range(0, i));
 
   // Each order with the present max_active, with none and with 1, as far as these are among the values.
   for (std::uint32_t order = 0; order < orders_.size(); ++order) {
@@ -159,31 +99,15 @@ SettingSpace::SettingSpace(const Workload &workload, const Freedom &freedom, std
         const bool has = cap && std::find(values.begin(), values.end(), *cap) != values.end();
         point.push_back(has ? *cap : (cap ? values.front() : workload.dags[d].max_active));
       }
-      point.resize(space_.values.size(), 0);
       space_.starts.push_back(std::move(point));
     }
   }
-}
-
-std::vector<std::uint32_t> SettingSpace::tie_order(const Point &point) const {
-  std::vector<std::uint32_t> order;
-  const std::size_t first = kCaps + orders_.front().workload.dags.size();
-  for (std::size_t i = 0; i < tied_.size(); ++i) {
-    const std::uint32_t before = i == 0 ? 0 : point[first + i - 1];
-    order.insert(order.end() - static_cast<std::ptrdiff_t>(before), tied_[i]);
-  }
-  return order;
 }
 
 Workload SettingSpace::apply(const Point &point) const {
   Workload workload = orders_[point[kOrder]].workload;
   for (std::size_t d = 0; d < workload.dags.size(); ++d) workload.dags[d].max_active = point[kCaps + d];
   workload.platform.workers = point.front();
-  const std::vector<std::uint32_t> order = tie_order(point);
-  if (order != tied_) {
-    set_priorities(workload, order);
-    workload.policy = PolicyKind::Fixed;
-  }
   return workload;
 }
 

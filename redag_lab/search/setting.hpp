@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The settings that `tune` may change, as one point of a search: workers, priorities, max_active of each DAG, and the
-// order of DAGs whose tasks share a priority. Pure functions.
+// The settings that `tune` may change, as one point of a search: workers, priorities, and max_active of each DAG. Pure
+// functions.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +21,6 @@ namespace redag::lab {
 struct Freedom {
   bool workers = true;
   bool caps = true;
-  bool ties = true;  // has no effect together with priorities
   bool priorities = false;
   std::uint32_t most_workers = 0;  // 0: the workload's number
   /// Replaces the usual values for every DAG, whatever its present one.
@@ -41,9 +40,7 @@ struct NamedOrder {
                                                     const analysis::AnalysisPlatform &platform, Objective objective,
                                                     const std::function<bool()> &stop = {});
 
-/// Maps points to settings. A point holds the workers, the position of the order, the max_active of each DAG, and a
-/// Lehmer code of the ties. For each DAG that shares a priority with an earlier one, the code is the number of these
-/// that it precedes. Every order of the DAGs is one point.
+/// Maps points to settings. A point holds the workers, the position of the order, and the max_active of each DAG.
 class SettingSpace {
  public:
   static constexpr std::size_t kOrder = 1;  // positions within a point; the workers come first
@@ -57,14 +54,11 @@ class SettingSpace {
 
   [[nodiscard]] Workload apply(const Point &point) const;
   [[nodiscard]] const std::vector<NamedOrder> &orders() const { return orders_; }
-  /// Returns the positions of the DAGs that tie with others, in the order of precedence.
-  [[nodiscard]] std::vector<std::uint32_t> tie_order(const Point &point) const;
   /// Returns the number of coordinates that differ from the present workload.
   [[nodiscard]] std::size_t changes(const Point &point) const;
 
  private:
   std::vector<NamedOrder> orders_;
-  std::vector<std::uint32_t> tied_;  // DAGs with a choice, in order of position
   SearchSpace space_;
 };
 

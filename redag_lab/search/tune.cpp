@@ -12,7 +12,6 @@
 #include <span>
 #include <utility>
 
-#include "redag/model/demand.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
 
 namespace redag::lab {
@@ -49,25 +48,19 @@ class Tuner {
     tuned.stopped = found.stopped;
     tuned.trials = std::move(found.trials);
     for (const NamedOrder &order : settings_.orders()) tuned.orders.push_back(order.name);
-    tuned.varies = options_.judge == Judge::Simulation && varies(tuned.present.workload);
     hold_out(tuned);
     return tuned;
   }
 
  private:
-  static bool varies(const Workload &workload) {
-    return std::any_of(workload.dags.begin(), workload.dags.end(),
-                       [](const Dag &dag) { return std::any_of(dag.tasks.begin(), dag.tasks.end(), demand_varies); });
-  }
-
   SettingCandidate candidate(const Point &point, const std::map<Point, Score> &trials) const {
-    return SettingCandidate{point, settings_.apply(point), trials.at(point), {}, {}};
+    return SettingCandidate{point, settings_.apply(point), trials.at(point), {}};
   }
 
-  // Simulates every workload with every seed, on all processors of the arena. If stopped, the result holds only the
-  // first workloads, each with all its seeds.
-  std::vector<std::vector<Score>> simulate(const std::vector<Workload> &workloads, std::uint64_t first_seed,
-                                           std::uint32_t seeds, const std::atomic<bool> *stop) {
+  // Simulates every workload with every seed, on all processors of the arena, and sums the scores of its runs. If
+  // stopped, the result holds only the first workloads, each with all its seeds.
+  std::vector<Score> simulate(const std::vector<Workload> &workloads, std::uint64_t first_seed, std::uint32_t seeds,
+                              const std::atomic<bool> *stop) {
     std::vector<std::vector<std::optional<Score>>> runs(workloads.size(), std::vector<std::optional<Score>>(seeds));
     arena_.execute([&] {
       tbb::parallel_for(std::size_t{0}, workloads.size() * seeds, [&](std::size_t i) {
@@ -76,22 +69,16 @@ class Tuner {
         runs[w][s] = score_of_run(workloads[w], first_seed + s, options_.simulation, stop);
       });
     });
-    std::vector<std::vector<Score>> whole;
+    std::vector<Score> scores;
     for (const auto &of_workload : runs) {
-      std::vector<Score> each;
+      Score score;
       for (const std::optional<Score> &run : of_workload) {
-        if (!run) return whole;
-        each.push_back(*run);
+        if (!run) return scores;
+        score.add(*run);
       }
-      whole.push_back(std::move(each));
+      scores.push_back(score);
     }
-    return whole;
-  }
-
-  static Score sum(const std::vector<Score> &runs) {
-    Score score;
-    for (const Score &run : runs) score.add(run);
-    return score;
+    return scores;
   }
 
   // Orders are the same for every number of workers.
@@ -134,10 +121,7 @@ class Tuner {
 
   // Scores the workloads by simulations. What misses no deadline there may be proven by the bounds.
   std::vector<Score> simulate_all(const std::vector<Workload> &workloads) {
-    std::vector<Score> scores;
-    for (const std::vector<Score> &runs : simulate(workloads, options_.seed, options_.seeds, options_.stop)) {
-      scores.push_back(sum(runs));
-    }
+    std::vector<Score> scores = simulate(workloads, options_.seed, options_.seeds, options_.stop);
     arena_.execute([&] {
       tbb::parallel_for(std::size_t{0}, scores.size(), [&](std::size_t i) {
         if (scores[i].missed > 0) return;
@@ -166,23 +150,18 @@ class Tuner {
     std::vector<Workload> workloads = {tuned.present.workload};
     if (tuned.found.point != tuned.present.point) workloads.push_back(tuned.found.workload);
     // Not stoppable: the setting that was found deserves a verdict.
-    const auto runs = simulate(workloads, options_.seed + options_.seeds, options_.held_out, nullptr);
-    judge(tuned.present, runs.front());
-    if (runs.size() > 1) judge(tuned.found, runs.back());
-    if (runs.size() == 1) tuned.found = tuned.present;
+    const std::vector<Score> scores = simulate(workloads, options_.seed + options_.seeds, options_.held_out, nullptr);
+    judge(tuned.present, scores.front());
+    if (scores.size() > 1) judge(tuned.found, scores.back());
+    if (scores.size() == 1) tuned.found = tuned.present;
     const bool holds = !improves(tuned.present.held_out, tuned.found.held_out, options_.objective);
     tuned.best = holds ? tuned.found : tuned.present;
   }
 
-  static void judge(SettingCandidate &candidate, const std::vector<Score> &runs) {
-    const auto as_score = [&](const std::vector<Score> &some) {
-      Score score = sum(some);
-      score.proven = candidate.score.proven;
-      score.changes = candidate.score.changes;
-      return score;
-    };
-    candidate.held_out = as_score(runs);
-    for (const Score &run : runs) candidate.held_out_runs.push_back(as_score({run}));
+  static void judge(SettingCandidate &candidate, Score score) {
+    score.proven = candidate.score.proven;
+    score.changes = candidate.score.changes;
+    candidate.held_out = score;
   }
 
   const TuneOptions &options_;

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Finds better workers, priorities, max_active and tie order for a workload. Settings are judged by the bounds alone,
+// Finds better workers, priorities and max_active for a workload. Settings are judged by the bounds alone,
 // or by simulations with several seeds. Then those that the bounds prove come first, and the winner is validated on
 // unseen seeds. Parallel (oneTBB); the result is the same for every number of processors.
 #pragma once
@@ -44,9 +44,8 @@ struct TuneOptions {
 struct SettingCandidate {
   Point point;
   Workload workload;
-  Score score;                       // by the bounds, or on the seeds of the search
-  Score held_out;                    // on the unseen seeds; a default Score if there are none
-  std::vector<Score> held_out_runs;  // per unseen seed
+  Score score;     // by the bounds, or on the seeds of the search
+  Score held_out;  // on the unseen seeds; a default Score if there are none
 };
 
 struct Tuned {
@@ -57,7 +56,6 @@ struct Tuned {
   std::vector<std::string> orders;  // names, by the number in a point
   bool exhaustive = true;
   bool stopped = false;
-  bool varies = true;  // execution times or jitter vary, and runs of different seeds differ
 
   [[nodiscard]] bool changed() const { return best.point != present.point; }
   /// True if the search found a better setting that was no better on the unseen seeds.

@@ -84,7 +84,7 @@ class Generator {
     const auto utilizations = draw_utilizations();
     if (!utilizations) {
       return make_error("no utilizations within the bound were drawn in the allowed attempts",
-                        "use more tasks, less utilization, or the method drs");
+                        "use more tasks, or less utilization");
     }
     std::size_t next = 0;
     for (std::uint32_t d = 0; d < o_.dags; ++d) {
@@ -229,12 +229,7 @@ class Generator {
   std::optional<std::vector<double>> draw_utilizations() {
     dag_ = 0;
     Rng rng = stream(Stream::Load);
-    const std::size_t count = workload_.task_count();
-    if (o_.method == UtilizationMethod::UUniFastDiscard) {
-      constexpr int kAttempts = 100'000;
-      return uunifast_discard(count, o_.utilization, o_.max_task_utilization, kAttempts, rng);
-    }
-    return drs(o_.utilization, std::vector<double>(count, o_.max_task_utilization), rng);
+    return drs(o_.utilization, std::vector<double>(workload_.task_count(), o_.max_task_utilization), rng);
   }
 
   void draw_demands(Dag &dag, std::span<const double> utilizations) {
@@ -305,8 +300,6 @@ Result<Workload> generate(const GenerateOptions &options, std::uint64_t seed) {
   return Generator(options, seed).run();
 }
 
-const char *to_string(UtilizationMethod value) { return value == UtilizationMethod::Drs ? "drs" : "uunifast_discard"; }
-
 const char *to_string(PeriodModel value) {
   switch (value) {
     case PeriodModel::LogUniform: return "log_uniform";
@@ -327,7 +320,5 @@ const char *to_string(DagShape value) {
   }
   return "?";
 }
-
-const char *to_string(RateScope value) { return value == RateScope::PerDag ? "per_dag" : "per_task"; }
 
 }  // namespace redag::lab

@@ -13,13 +13,6 @@
 
 namespace redag::lab {
 
-/// How the total utilization is shared among the tasks. Both methods draw uniformly from the vectors that keep the
-/// bound.
-enum class UtilizationMethod : std::uint8_t {
-  Drs,             // Dirichlet-Rescale (Griffin, Bate, Davis, RTSS 2020)
-  UUniFastDiscard  // Davis, Burns, RTSS 2009; fails where almost every draw exceeds the bound
-};
-
 enum class PeriodModel : std::uint8_t {
   LogUniform,  // [period_min, period_max], multiples of period_granularity (Emberson, Stafford, Davis, WATERS 2010)
   Harmonic,    // period_min * 2^k up to period_max, equally likely
@@ -40,12 +33,10 @@ enum class RateScope : std::uint8_t {
   PerTask,  // each timer task draws its own
 };
 
-inline constexpr std::array kUtilizationMethods = {UtilizationMethod::Drs, UtilizationMethod::UUniFastDiscard};
 inline constexpr std::array kPeriodModels = {PeriodModel::LogUniform, PeriodModel::Harmonic, PeriodModel::Automotive,
                                              PeriodModel::Robot};
 inline constexpr std::array kDagShapes = {DagShape::Layered, DagShape::ErdosRenyi, DagShape::ForkJoin, DagShape::Chain,
                                           DagShape::Independent};
-inline constexpr std::array kRateScopes = {RateScope::PerDag, RateScope::PerTask};
 
 inline constexpr std::uint32_t kMaxTasks = 10'000'000;  // of a generated workload
 
@@ -60,7 +51,6 @@ struct GenerateOptions {
 
   double utilization = 1.0;           // of all tasks together
   double max_task_utilization = 1.0;  // of one task
-  UtilizationMethod method = UtilizationMethod::Drs;
 
   PeriodModel periods = PeriodModel::LogUniform;
   Duration period_min = 5 * kMillisecond;  // LogUniform, Harmonic
@@ -90,13 +80,10 @@ struct GenerateOptions {
 [[nodiscard]] Diagnostics find_mistakes(const GenerateOptions &options);
 
 /// Generates a workload that passes validate() without errors. Its utilization is the target within rounding (each wcet
-/// to a nanosecond, at least 1). Errors: options out of range, each with a message, and a UUniFastDiscard that found no
-/// vector.
+/// to a nanosecond, at least 1), shared among the tasks by drs(). Errors: options out of range, each with a message.
 [[nodiscard]] Result<Workload> generate(const GenerateOptions &options, std::uint64_t seed);
 
-[[nodiscard]] const char *to_string(UtilizationMethod value);
 [[nodiscard]] const char *to_string(PeriodModel value);
 [[nodiscard]] const char *to_string(DagShape value);
-[[nodiscard]] const char *to_string(RateScope value);
 
 }  // namespace redag::lab

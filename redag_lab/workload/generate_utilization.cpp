@@ -100,22 +100,4 @@ std::optional<Vector> drs(double total, const Vector &upper, Rng &rng) {
   return std::nullopt;
 }
 
-std::optional<Vector> uunifast_discard(std::size_t count, double total, double bound, int attempts, Rng &rng) {
-  REDAG_CHECK(count > 0, "there is something to share");
-  Vector values(count);
-  for (int attempt = 0; attempt < attempts; ++attempt) {
-    double rest = total;
-    bool kept = true;
-    for (std::size_t i = 0; i + 1 < count && kept; ++i) {
-      const double next = rest * std::pow(rng.uniform01(), 1.0 / static_cast<double>(count - i - 1));
-      values[i] = rest - next;
-      kept = values[i] <= bound;
-      rest = next;
-    }
-    values.back() = rest;
-    if (kept && rest <= bound) return values;
-  }
-  return std::nullopt;
-}
-
 }  // namespace redag::lab

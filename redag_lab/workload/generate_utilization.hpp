@@ -18,10 +18,4 @@ namespace redag::lab {
 /// total > 0 and total <= sum upper. Returns nothing if rounding defeated every attempt.
 [[nodiscard]] std::optional<std::vector<double>> drs(double total, const std::vector<double> &upper, Rng &rng);
 
-/// Draws uniformly from {u : sum u = total, 0 <= u_i <= bound}: UUniFast (E. Bini, G. Buttazzo, RTS 30, 2005) until a
-/// vector keeps the bound (R. Davis, A. Burns, RTSS 2009). Returns nothing after `attempts` vectors that break the
-/// bound.
-[[nodiscard]] std::optional<std::vector<double>> uunifast_discard(std::size_t count, double total, double bound,
-                                                                  int attempts, Rng &rng);
-
 }  // namespace redag::lab

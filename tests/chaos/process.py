@@ -83,7 +83,7 @@ def check_results(folder, tidy=True):
         if ".tmp." in path.name:
             expect(not tidy, f"{path.name} was left behind")
         elif path.name == "events.redag":
-            Child("check-trace", path).end({0})
+            Child("events", "--check", path).end({0})
         elif path.suffix == ".json":
             json.loads(path.read_text())
         elif path.suffix in (".csv", ".html", ".svg"):
@@ -115,7 +115,7 @@ def some_command(rng, folder):
         ["simulate", file, "--duration", "20000s", *out],
         ["compare", file, "--duration", "1s", "--executors", "redag-none,mte", "--repeat", "20", *out],
         ["experiment", SOURCE / "evaluation" / "experiments" / "acceptance_dags.yaml", *out],
-        ["sensitivity", SOURCE / "workloads" / "robot.yaml", "--simulate"],
+        ["analyze", SOURCE / "workloads" / "robot.yaml", "--sensitivity"],
     ])
 
 
@@ -256,7 +256,7 @@ def read_only(rng, folder):
     program, file = for_everybody(folder, rng)
     (folder / "out").mkdir(mode=0o755)
     command = rng.choice([["run", file, "--duration", "100ms"], ["simulate", file], ["compare", file, "--simulate"],
-                          ["generate", "--count", "2"], ["experiment", acceptance_plan(folder, 2)]])
+                          ["experiment", acceptance_plan(folder, 2)]])
     target = folder / "out" if rng.random() < 0.5 else folder / "out" / "deeper"
     child = Child(*command, "--out", target, executable=program, prepare=as_nobody()).end({2})
     expect("Permission denied" in child.err, child.err)
@@ -269,7 +269,6 @@ def writing_command(rng, folder, out):
         ["simulate", file, "--duration", "2s", "--out", out],
         ["compare", file, "--simulate", "--duration", "1s", "--out", out],
         ["run", file, "--duration", "200ms", "--preemption", "none", "--out", out],
-        ["generate", "--count", "40", "--out", out],
         ["experiment", acceptance_plan(folder, 50), "--out", out],
     ])
 

@@ -102,12 +102,11 @@ class Combinations(Case):
         return result
 
     def test_numbers_that_mean_nothing(self):
-        for command in ("simulate", "run", "compare", "analyze", "sensitivity", "tune"):
+        for command in ("simulate", "run", "compare", "analyze", "tune"):
             self.refuse(command, self.cart, "--workers", "0", says="--workers: '0' is not a whole number from 1 to 4096")
             self.refuse(command, self.cart, "--workers", "-1", says="--workers: '-1' is not a whole number from 1 to 4096")
         self.refuse("compare", self.cart, "--repeat", "0", says="--repeat: '0' is not a whole number from 1 to 10000")
         self.refuse("experiment", self.cart, "--out", self.folder / "out", "--jobs", "100000", says="--jobs: '100000' is not a whole number from 1 to 1024")
-        self.refuse("generate", "--count", "2", "--seed", str(2**64 - 1), "--out", self.folder / "out", says="last seed")
         self.refuse("compare", self.cart, "--simulate", "--repeat", "2", "--seed", str(2**64 - 1), says="last seed")
         self.refuse("tune", self.cart, "--seed", str(2**64 - 1), says="last seed")
         self.refuse("generate", "--period-min", "1h", "--period-max", "1s", says="--period-min to --period-max")
@@ -139,9 +138,8 @@ class Combinations(Case):
         self.refuse("compare", self.cart, "--executors", "redag", says="no other executor to compare 'redag' with")
         self.refuse("compare", self.cart, "--simulate", "--affinity", "0", says="excludes")
         self.refuse("compare", self.cart, "--overhead-release", "5us", says="--overhead-release requires --simulate")
-        self.refuse("sensitivity", self.cart, "--duration", "1s", says="--duration requires --simulate")
+        self.refuse("analyze", self.cart, "--sensitivity", "--executor", "ste", says="available for ReDAG-RT only")
         self.refuse("simulate", self.cart, "--force", says="--force requires --out")
-        self.refuse("generate", "--force", says="--force requires --out")
         self.refuse("analyze", "--methods", "--explain", "a.x", says="FILE is required")
         self.refuse("top", "--list", "5", says="excludes")
         self.refuse("simulate", self.cart, "--duration", "1s", "--duration", "2s", says="--duration is given more than once")
@@ -170,7 +168,7 @@ class Files(Case):
     def test_what_is_no_file(self):
         for place in ("/dev/zero", "/nonexistent", self.folder / "empty"):
             (self.folder / "empty").mkdir(exist_ok=True)
-            for command in (["validate"], ["simulate"], ["analyze"], ["check-trace"], ["report"], ["experiment", "--out", self.folder / "m"]):
+            for command in (["validate"], ["simulate"], ["analyze"], ["events", "--check"], ["report"], ["experiment", "--out", self.folder / "m"]):
                 result = self.expect(self.limited(*command, place), 2, "error: ")
                 self.assertLess(len(result.stderr), 4000)
         self.assertFalse((self.folder / "m").exists())

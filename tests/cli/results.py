@@ -2,11 +2,10 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Tests the commands that read results: `redag compare A B`, `check-trace`, `events`, `report`, `tune`.
+"""Tests the commands that read results: `redag compare A B`, `events`, `report`, `tune`.
 
 Usage: results.py PROGRAM SOURCE_DIR. Uses the standard library only.
 """
-import csv
 import json
 import os
 import re
@@ -36,15 +35,14 @@ class CompareResults(Case):
         self.assertRegex(redag("compare", full, none).stdout, r"\AB misses more deadlines than A: 200 ")
         self.assertIn("better fast.sense: missed 200 (10.0 %) -> 0", result.stdout)
         self.assertIn("worse slow.plan: p50 27ms -> 33ms", result.stdout)
-        self.assertNotIn("correlated beyond the blocks", result.stdout)
         self.expect(redag("compare", none, full, "--check"), 1)
         self.expect(redag("compare", none, none, "--check"), 0)
         equal = redag("compare", none, none)
         self.assertRegex(equal.stdout, r"\AA and B miss equally many deadlines: .*; no figure differs significantly\n")
         self.assertNotIn("plan", equal.stdout)
-        self.assertIn("(5 rows without a difference; --all-tasks shows all)", equal.stdout)
-        self.assertIn("plan", redag("compare", none, none, "--all-tasks").stdout)
-        document = self.document(redag("compare", none, full, "--json"), "redag.difference/2")
+        self.assertRegex(equal.stdout, r"\(\d+ figures without a difference; --all-tasks shows all\)")
+        self.assertIn("same slow.plan: missed 0", redag("compare", none, none, "--all-tasks").stdout)
+        document = self.document(redag("compare", none, full, "--json"), "redag.difference/3")
         self.assertEqual(document["changes"], [{"kind": "setting", "what": "preemption", "a": "none", "b": "os"}])
         self.assertEqual([row["task"] for row in document["rows"]], [None, None, "sense", "act", None, "plan"])
         self.assertTrue(document["worse"] and document["better"])
@@ -56,12 +54,12 @@ class CompareResults(Case):
         self.expect(redag("compare", file, "--simulate", "--duration", "20s", "--repeat", "3", "--executors",
                           "redag,mte", "--out", folder), 0)
         result = redag("compare", folder / "mte", folder / "redag", "--json")
-        self.assertEqual(self.document(result, "redag.difference/2")["a"]["seeds"], [1, 2, 3])
+        self.assertEqual(self.document(result, "redag.difference/3")["a"]["seeds"], [1, 2, 3])
         self.expect(redag("compare", folder, folder / "mte"), 2, "holds runs of several kinds: redag, mte", "name one of them")
         # Repetitions in folders of other names, as run_workload of redag_rclcpp_lab writes them.
         for n in 1, 2, 3:
             (folder / "redag" / f"repetition-{n}").rename(folder / "redag" / str(n))
-        again = self.document(redag("compare", folder / "mte", folder / "redag", "--json"), "redag.difference/2")
+        again = self.document(redag("compare", folder / "mte", folder / "redag", "--json"), "redag.difference/3")
         self.assertEqual(again["b"]["seeds"], [1, 2, 3])
         self.assertEqual(again["rows"], json.loads(result.stdout)["rows"])
 
@@ -81,7 +79,7 @@ class CompareResults(Case):
         self.expect(redag("run", self.cart, "--duration", "500ms", "--out", on_threads), 0)
         text = self.expect(redag("compare", simulated, on_threads), 0).stdout
         self.assertIn("caution: one side comes from 'simulator', the other from 'threads'", text)
-        self.assertIn("caution: one side has a single run", text)
+        self.assertIn("caution: one side has fewer than 5 runs", text)
         elsewhere = self.folder / "elsewhere"
         elsewhere.mkdir()
         changed = changed_run((on_threads / "events.redag").read_bytes(), '"machine":{"cpus":', '"machine":{"cpus":9')
@@ -112,29 +110,29 @@ class CheckTrace(Case):
 
     def test_damaged_traces(self):
         trace = self.trace()
-        self.assertIn("trace check: ok", self.expect(redag("check-trace", trace), 0).stdout)
+        self.assertIn("trace check: ok", self.expect(redag("events", "--check", trace), 0).stdout)
         cut = self.folder / "cut.redag"
         cut.write_bytes(trace.read_bytes()[:100])
-        self.expect(redag("check-trace", cut), 2, "cut.redag")
-        self.expect(redag("check-trace", "--json", cut, trace), 2)
-        self.expect(redag("check-trace", self.write("no.redag", "no trace\n")), 2, "no.redag: error: not a file of events")
-        self.expect(redag("check-trace", "/dev/null"), 2)
+        self.expect(redag("events", "--check", cut), 2, "cut.redag")
+        self.expect(redag("events", "--check", "--json", cut, trace), 2)
+        self.expect(redag("events", "--check", self.write("no.redag", "no trace\n")), 2, "no.redag: error: not a file of events")
+        self.expect(redag("events", "--check", "/dev/null"), 2)
 
     def test_a_lie_is_found(self):
         trace = self.trace()
         # The same events under another policy: a job was chosen against the rules.
         lie = self.changed(trace, "lie.redag", '"policy":"rate_monotonic"', '"policy":"fifo"')
-        result = self.expect(redag("check-trace", lie), 1)
+        result = self.expect(redag("events", "--check", lie), 1)
         self.assertIn("violations", result.stdout)
-        document = self.document(redag("check-trace", "--json", lie), "redag.check-trace/1", 1)
+        document = self.document(redag("events", "--check", "--json", lie), "redag.check-trace/1", 1)
         self.assertGreater(document["traces"][0]["check"]["violation_count"], 0)
 
         # Nodes record no decisions: the checker must not judge them.
         nodes = self.changed(lie, "nodes.redag", '"driver":"simulator"', '"driver":"ros_nodes"')
-        self.expect(redag("check-trace", nodes), 0)
+        self.expect(redag("events", "--check", nodes), 0)
 
     def test_folder_without_traces(self):
-        self.expect(redag("check-trace", self.folder), 2, "no events.redag")
+        self.expect(redag("events", "--check", self.folder), 2, "no events.redag")
 
 
 KINDS = ["released", "ready", "deferred", "dispatched", "started", "preempted", "resumed", "finished", "skipped", "aborted",
@@ -228,18 +226,6 @@ class Events(Case):
         self.expect(redag("events", out, "-o", in_file), 0)
         self.assertEqual([json.loads(line) for line in in_file.read_text().splitlines()], printed)
 
-    def test_csv(self):
-        out = self.results("out")
-        rows = list(csv.DictReader(self.expect(redag("events", out, "--format", "csv"), 0).stdout.splitlines()))
-        lines = redag("events", out).stdout.splitlines()
-        self.assertEqual(len(rows), len(lines) - 2)
-        for row, line in zip(rows, lines[1:]):
-            event = json.loads(line)
-            self.assertEqual([row["time_ns"], row["kind"], row["job"], row["value_ns"], row["reason"]],
-                             [str(event[i]) for i in (0, 1, 3, 5, 6)])
-            self.assertEqual(row["worker"], "" if event[4] < 0 else str(event[4]))
-        self.assertEqual({(row["dag"], row["task"]) for row in rows}, {("fast", "sense"), ("fast", "act"), ("slow", "plan")})
-
     def test_a_picture_can_be_made_later(self):
         with_picture, without = self.results("with"), self.results("without", "--picture", "never")
         self.assertFalse((without / "trace.pftrace").exists())
@@ -269,7 +255,7 @@ class Events(Case):
         result = self.expect(redag("simulate", self.cart, "--duration", "700s", "--out", out), 0)
         self.assertFalse((out / "trace.pftrace").exists())
         self.assertIn(f"redag events {out} --format perfetto", result.stdout)
-        self.assertGreater(json.loads(redag("check-trace", out, "--json").stdout)["traces"][0]["run"]["events"], 500_000)
+        self.assertGreater(json.loads(redag("events", "--check", out, "--json").stdout)["traces"][0]["run"]["events"], 500_000)
         self.expect(redag("simulate", self.cart, "--duration", "700s", "--picture", "always", "--out", out), 0)
         self.assertTrue((out / "trace.pftrace").exists())
 
@@ -281,11 +267,11 @@ class Events(Case):
         for command in ["why"], ["events"]:
             self.assertIn("; 55 bytes are no whole block", self.expect(redag(*command, out), 0).stderr)
         events.write_bytes(good[:5000] + b"#" + good[5001:])
-        self.expect(redag("check-trace", out), 2, "events.redag: error: byte ", "the checksum of the block does not match")
+        self.expect(redag("events", "--check", out), 2, "events.redag: error: byte ", "the checksum of the block does not match")
         events.write_bytes(good.replace(b"\r\n", b"\n", 1))
-        self.expect(redag("check-trace", out), 2, "the file was copied as text")
+        self.expect(redag("events", "--check", out), 2, "the file was copied as text")
         events.write_bytes(b"")
-        self.expect(redag("check-trace", out), 2, "the file is empty")
+        self.expect(redag("events", "--check", out), 2, "the file is empty")
 
     def test_mistakes(self):
         out = self.results("out")
@@ -395,7 +381,6 @@ dags:
         result = self.expect(redag("tune", file, "-o", tuned), 0, "wrote")
         self.assertIn("change max_active of wide: none -> 1", result.stdout)
         self.assertRegex(result.stdout, r"misses, on unseen seeds: [\d ]+ \([\d.]+ %\) -> none")
-        self.assertIn("seed by seed: 10 better, 0 equal, 0 worse", result.stdout)
         self.expect(redag("validate", "--strict", tuned), 0)
         self.assertIn("bcet: 20ms", tuned.read_text())
         self.assertRegex(tuned.read_text(), r'^# created: "2\d{3}-.*\n(# .*\n)*# command: ".* tune .*"\n')
@@ -422,16 +407,15 @@ dags:
     def test_json_is_the_same_for_every_number_of_processors(self):
         file = self.write("wide.yaml", self.WIDE)
         one = redag("tune", file, "--jobs", "1", "--duration", "2s", "--json")
-        document = self.document(one, "redag.tuning/2")
+        document = self.document(one, "redag.tuning/3")
         self.assertEqual(body(one.stdout), body(redag("tune", file, "--jobs", "3", "--duration", "2s", "--json").stdout))
         self.assertEqual(document["best"]["max_active"], {"wide": 1, "quick": 0})
-        self.assertEqual(len(document["best"]["held_out_runs"]), 10)
 
     def test_pairs(self):
         paper = SOURCE / "workloads" / "paper" / "harmonic_u08.yaml"
         result = redag("tune", paper, "--vary", "max_active", "--caps", "2-5", "--duration", "2s",
                        "--seeds", "1", "--held-out", "1", "--json")
-        trials = self.document(result, "redag.tuning/2")["trials"]
+        trials = self.document(result, "redag.tuning/3")["trials"]
         pairs = sorted((trial["max_active"]["dag1"], trial["max_active"]["dag2"]) for trial in trials)
         self.assertEqual(pairs, [(a, b) for a in range(2, 6) for b in range(2, 6)])
 

@@ -34,7 +34,7 @@ dags:
   - name: threads/scan
     tasks: [{name: run, wcet: 500us, period: 20ms}]
 """)
-        for command in (["analyze", "--check"], ["simulate", "--duration", "2s"], ["sensitivity"]):
+        for command in (["analyze", "--check"], ["simulate", "--duration", "2s"], ["analyze", "--sensitivity"]):
             robot, hand = (self.expect(redag(command[0], file, *command[1:], "--json"), 0).stdout
                            for file in (EXAMPLE, by_hand))
             self.assertEqual(body(robot), body(hand), command[0])
@@ -66,8 +66,8 @@ dags:
         bound = {dag["name"]: dag["bound_ns"] for dag in document["dags"]}
         self.assertGreaterEqual(bound["drive/avoid"], bound["vision/camera"] + 500_000 + 1_200_000)
         self.expect(redag("simulate", linked, "--duration", "2s"), 0)
-        for command in (["tune"], ["sensitivity"]):
-            self.assertIn(f"{command[0]} changes tasks", self.expect(redag(*command, linked), 2).stderr)
+        for command in (["tune"], ["analyze", "--sensitivity"]):
+            self.assertIn(f"{command[-1]} changes tasks", self.expect(redag(*command, linked), 2).stderr)
         for command in (["analyze", "--overhead-release", "1us"], ["simulate", "--workers", "3"]):
             self.assertIn("hold for the platform in its file", self.expect(redag(*command, linked), 2).stderr)
         late = self.write("late.yaml", linked.read_text().replace("transport: 500us", "transport: 30ms"))

@@ -23,23 +23,18 @@ from program import CART, PROGRAM, SOURCE, Case, body, in_terminal, interrupt, m
 class Calibrate(Case):
     def calibrated(self, *arguments):
         path = self.folder / "overheads.yaml"
-        result = redag("calibrate", "--duration", "1s", "--out", path, "--json", *arguments)
-        return path, self.document(result, "redag.calibration/1")
+        return path, self.expect(redag("calibrate", "--duration", "1s", "--out", path, *arguments), 0).stdout
 
     def test_a_file_that_the_others_charge(self):
-        path, document = self.calibrated()
-        self.assertTrue(document["complete"])
-        self.assertGreater(document["overheads"]["normal"]["dispatch_ns"], 0)
-        measured = {row["what"] for row in document["measured"]}
-        self.assertLessEqual({"thread_clock", "steady_clock", "lateness", "dispatch", "preempt", "timer", "stall"}, measured)
-        for row in document["measured"]:
-            self.assertGreater(row["samples"], 0)
-            self.assertTrue(row["p50_ns"] <= row["p99_ns"] <= row["p999_ns"] <= row["max_ns"], row)
+        path, text = self.calibrated()
+        measured = set(re.findall(r"(?m)^(\w+) +(?:normal|any) +[1-9]", text))
+        self.assertLessEqual({"thread_clock", "lateness", "dispatch", "preempt", "timer", "stall"}, measured)
+        self.assertIn("overheads charged on ordinary threads: timer ", text)
         self.assertIn("provenance:", path.read_text())
         plain = json.loads(redag("analyze", self.cart, "--json").stdout)
         charged = json.loads(redag("analyze", self.cart, "--json", "--overheads", path).stdout)
         self.assertGreater(charged["utilization"], plain["utilization"])
-        self.assertEqual(charged["overheads_ns"]["dispatch"], document["overheads"]["normal"]["dispatch_ns"])
+        self.assertGreater(charged["overheads_ns"]["dispatch"], 0)
         self.assertIn(str(path), charged["provenance"]["calibration"])
         self.assertIn("overheads: release", redag("simulate", self.cart, "--duration", "1s", "--overheads", path).stdout)
 
@@ -77,16 +72,15 @@ class Calibrate(Case):
         self.expect(redag("calibrate", "--duration", "200h"), 2, "longer than a day")
         self.expect(redag("calibrate", "--duration", "1s", "--out", self.folder / "no" / "folder.yaml"), 2, "folder.yaml")
 
-    def test_interrupted_it_shows_what_it_has_and_writes_nothing(self):
+    def test_interrupted_it_writes_nothing(self):
         path = self.write("before.yaml", "of an earlier calibration\n")
         with subprocess.Popen([PROGRAM, "calibrate", "--duration", "10min", "--loaded", "--out", path], text=True,
                               stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
-            interrupt(process, after=5)
+            interrupt(process, after=2)
             out, error = process.communicate(timeout=60)
         self.assertEqual(process.returncode, 2, error)
         self.assertIn("interrupted: ", error)
-        self.assertIn("before.yaml is not written", error)
-        self.assertIn("incomplete: the calibration ended early", out)
+        self.assertEqual(out, "")
         self.assertEqual(path.read_text(), "of an earlier calibration\n")
 
 
@@ -162,7 +156,7 @@ class Simulate(Case):
         out = self.folder / "out"
         result = self.expect(redag("simulate", self.cart, "--duration", "60s", "--max-events", "5000", "--out", out), 0)
         self.assertIn("--max-events", result.stdout)
-        self.expect(redag("check-trace", out), 0)
+        self.expect(redag("events", "--check", out), 0)
         self.assertGreater(json.loads((out / "summary.json").read_text())["end_ns"],
                            json.loads(redag("events", out).stdout.splitlines()[-1])["end_ns"])
 
@@ -202,7 +196,7 @@ class Waits(Case):
         events = redag("events", out).stdout
         for kind in ("waits", "served", "woken"):
             self.assertIn(kind, events)
-        self.expect(redag("check-trace", out), 0)
+        self.expect(redag("events", "--check", out), 0)
         self.assertIn("waited without a worker", self.expect(redag("why", out, "lidar.segment#0"), 0).stdout)
 
     def test_bounded_on_one_worker(self):
@@ -239,7 +233,7 @@ class Waits(Case):
                 self.expect(redag(command[0], self.FILE, *command[1:], "-o", tuned), 0)
                 self.expect(redag("validate", tuned), 0)
                 self.assertIn("device: gpu", tuned.read_text())
-        margins = self.expect(redag("sensitivity", self.FILE), 0).stdout
+        margins = self.expect(redag("analyze", "--sensitivity", self.FILE), 0).stdout
         self.assertIn("lidar.segment", margins)
 
     def test_run_on_threads_and_checked(self):
@@ -250,7 +244,7 @@ class Waits(Case):
                 events = redag("events", out).stdout
                 for kind in ("waits", "served", "woken"):
                     self.assertIn(kind, events)
-                self.expect(redag("check-trace", out), 0)
+                self.expect(redag("events", "--check", out), 0)
                 task, number = json.loads(next(line for line in events.splitlines() if '"woken"' in line))[2:4]
                 job = {4: "camera.detect", 6: "lidar.segment"}[task] + f"#{number}"
                 self.assertIn("waited without a worker", self.expect(redag("why", out, job), 0).stdout)
@@ -413,7 +407,7 @@ class Killed(Case):
             if record.exists() and record.stat().st_size > 8000:
                 break
             time.sleep(0.02)
-        self.assertIn("still goes on", redag("check-trace", out).stderr)
+        self.assertIn("still goes on", redag("events", "--check", out).stderr)
         process.kill()
         process.wait()
 
@@ -421,7 +415,7 @@ class Killed(Case):
         out = self.folder / "out"
         self.killed_run(out)
         self.assertEqual([path.name for path in out.iterdir()], ["events.redag"])
-        self.assertIn("the run was killed, or still goes on", self.expect(redag("check-trace", out), 0).stderr)
+        self.assertIn("the run was killed, or still goes on", self.expect(redag("events", "--check", out), 0).stderr)
         self.assertIn("the run was killed", self.expect(redag("why", out), 0).stderr)
         text = self.expect(redag("report", out, "--json"), 0).stdout
         self.assertIn("the record ends here: the run was killed", text)
@@ -436,7 +430,7 @@ class Killed(Case):
         self.assertIn("an earlier run did not end normally", result.stderr)
         self.assertEqual(sorted(path.name for path in out.iterdir()),
                          ["events.1.redag", "events.redag", "jobs.csv", "summary.json", "trace.pftrace"])
-        self.assertEqual(self.expect(redag("check-trace", out), 0).stderr, "")
+        self.assertEqual(self.expect(redag("events", "--check", out), 0).stderr, "")
         self.expect(redag("why", out / "events.1.redag"), 0)
 
     def test_a_small_record_keeps_the_newest(self):
@@ -459,9 +453,7 @@ class Compare(Case):
                 self.assertEqual(dag["missed"], sum(run["dags"][d]["missed"] for run in runs))
         self.assertEqual(len(document["verdicts"]), 2)
         self.assertEqual(json.loads((out / "comparison.json").read_text()), document)
-        with open(out / "comparison.csv", newline="") as file:
-            self.assertEqual(len(list(csv.DictReader(file))), 3 * 2 * 2)
-        self.expect(redag("check-trace", out), 0)
+        self.expect(redag("events", "--check", out), 0)
 
     def test_on_threads(self):
         result = self.expect(redag("compare", self.cart, "--duration", "300ms", "--repeat", "1"), 0)

@@ -41,22 +41,6 @@ dags:
   - {name: vision, cluster: big, tasks: [{name: grab, wcet: 2ms, period: 20ms}, {name: look, wcet: 6ms, activation: data, after: grab}]}
   - {name: control, cluster: little, tasks: [{name: pid, wcet: 1ms, period: 5ms}]}
 """
-ACCEPTANCE = """\
-experiment: acceptance
-sets: 4
-utilization: [0.5, 0.9]
-methods: [melani, dag_bounded]
-"""
-FACTORIAL = """\
-experiment: factorial
-name: small
-repetitions: 2
-duration: 200ms
-workloads: [long.yaml]
-workers: [1, 2]
-demand_scale: [0.5, 1]
-executors: [ideal, redag, mte]
-"""
 
 
 class Tables(Case):
@@ -101,7 +85,7 @@ class Tables(Case):
 
     def test_check_trace(self):
         self.expect(redag("simulate", self.long, "--duration", "1s", "--out", self.folder / "run"), 0)
-        self.agree("check_trace", "check-trace", "run")
+        self.agree("check_trace", "events", "--check", "run")
 
     def test_validate(self):
         self.agree("validate", "validate", self.long)
@@ -116,19 +100,13 @@ class Tables(Case):
         self.agree("clusters", "analyze", self.write("clusters.yaml", CLUSTERS))
 
     def test_sensitivity(self):
-        self.agree("sensitivity", "sensitivity", self.long)
+        self.agree("sensitivity", "analyze", "--sensitivity", self.long)
 
     def test_assign(self):
         self.agree("tune_by_bounds", "tune", "--judge", "bounds", self.long)
 
     def test_tune(self):
         self.agree("tune", "tune", self.long, "--duration", "200ms")
-
-    def test_acceptance(self):
-        self.agree("acceptance", "experiment", self.write("acceptance.yaml", ACCEPTANCE), "--out", "acceptance")
-
-    def test_factorial(self):
-        self.agree("factorial", "experiment", self.write("factorial.yaml", FACTORIAL), "--out", "factorial")
 
     def test_a_terminal_tells_its_width(self):
         """A pseudo-terminal of 60 columns shows what COLUMNS=60 does."""

@@ -98,7 +98,7 @@ class Why(Case):
         self.expect(redag("why", folder, "control.controller#9999"), 2, "its jobs are 0 to")
         self.expect(redag("why", folder, "control.controller#x"), 2, "has no job 'x'")
         self.expect(redag("why", folder, "--kernel", self.cart), 2, "does not say when it was")
-        for command in ("why", "events", "check-trace", "report"):
+        for command in ("why", "events", "report"):
             self.expect(redag(command, self.cart), 2, "this is a workload, and not a recorded run", "redag simulate")
 
     def test_of_a_comparison_the_worst_repetition(self):

@@ -47,13 +47,13 @@ void commands_target(std::string_view input) {
     REDAG_CHECK(answers({"simulate", file, "--executor", executor, "--duration", duration, "--json"}), executor);
   }
   REDAG_CHECK(answers({"simulate", file, "--duration", duration, "--out", results, "--force"}), "simulate");
-  REDAG_CHECK(answers({"check-trace", results}), "check-trace: what was simulated is lawful");
+  REDAG_CHECK(answers({"events", "--check", results}), "events --check: what was simulated is lawful");
   REDAG_CHECK(answers({"report", results}), "report");
   REDAG_CHECK(answers({"analyze", file, "--json"}), "analyze");
   constexpr std::size_t kMostTasks = 4;  // limit for the commands that analyse repeatedly
   if (loaded->workload.task_count() > kMostTasks) return;
   if (!loaded->workload.platform.clusters.empty()) return;  // these commands refuse clusters
-  REDAG_CHECK(answers({"sensitivity", file, "--json"}), "sensitivity");
+  REDAG_CHECK(answers({"analyze", file, "--sensitivity", "--json"}), "analyze --sensitivity");
   REDAG_CHECK(answers({"tune", "--judge", "bounds", file, "--json"}), "tune --judge bounds");
 }
 

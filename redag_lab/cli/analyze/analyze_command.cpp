@@ -15,6 +15,7 @@
 #include "redag_lab/cli/analyze/analysis_arguments.hpp"
 #include "redag_lab/cli/analyze/analysis_chains.hpp"
 #include "redag_lab/cli/analyze/analysis_explanation.hpp"
+#include "redag_lab/cli/analyze/analysis_margins.hpp"
 #include "redag_lab/cli/analyze/analysis_report.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/options.hpp"
@@ -32,6 +33,7 @@ struct AnalyzeOptions {
   std::vector<std::string> only;  // names of methods
   bool methods = false;
   bool all = false;
+  bool sensitivity = false;
 };
 
 const Choices<std::string> &executor_choices() {
@@ -50,7 +52,9 @@ using Parts = std::vector<lab::AnalysedPart>;
 // What the command line asks of one part.
 struct Asked {
   std::vector<ChainRow> chains;
-  std::optional<lab::Row> row;  // of --explain
+  std::vector<lab::Margin> margins;  // of --sensitivity
+  bool all_margins = true;           // false: stopped before the last one
+  std::optional<lab::Row> row;       // of --explain
 };
 
 // Returns where a task or DAG of this name is, or the error of the part with the nearest name.
@@ -127,12 +131,16 @@ std::string text_of(const lab::AnalysedPart &part, const Asked &asked, const Ana
         options.all || every_task ? describe(part.analysed, terminal, every_task) : summarise(part.analysed, terminal);
   }
   if (!asked.chains.empty()) text += "\n" + describe(part.analysed, asked.chains, terminal);
+  if (!asked.margins.empty()) text += "\n" + describe(part.analysed, asked.margins, terminal, every_task);
   return text;
 }
 
 Json json_of(const lab::AnalysedPart &part, const Asked &asked, const AnalyzeOptions &options) {
   Json document = to_json(part.analysed, options.methods);
   if (!asked.chains.empty()) document["chains"] = to_json(part.analysed, asked.chains);
+  if (options.sensitivity) {
+    document["sensitivity"] = {{"complete", asked.all_margins}, {"limits", to_json(part.analysed, asked.margins)}};
+  }
   if (asked.row) {
     document["explanation"] = {{"name", asked.row->name}, {"text", explain(part.analysed, *asked.row, StreamTraits{})}};
   }
@@ -154,10 +162,40 @@ Json json_of(const Parts &parts, const std::vector<Asked> &asked, const AnalyzeO
   return document;
 }
 
+// Finds the margin of every execution time and rate of a part. Those found before an early end remain.
+void find_margins(const lab::Analysed &analysed, AnalysisWatch &watch, Asked &asked, Console &console) {
+  std::vector<lab::Margin> &margins = asked.margins;
+  const std::vector<lab::Knob> knobs = lab::knobs_of(analysed.workload, analysed.task_set);
+  Progress &progress = watch.progress();
+  lab::SensitivityOptions searching;
+  searching.stop = [&] {
+    if (progress.due()) {
+      const double share = static_cast<double>(margins.size()) / static_cast<double>(knobs.size());
+      progress.draw(share, knob_name(analysed, knobs[margins.size()]) + progress.left(share));
+    }
+    return !watch.why_stop().empty();
+  };
+  for (const lab::Knob &knob : knobs) {
+    auto margin =
+        lab::margin_of(analysed.workload, analysed.task_set.platform, knob, lab::accepted_by_analysis, searching);
+    if (!margin) break;
+    margins.push_back(*std::move(margin));
+  }
+  progress.clear();
+  asked.all_margins = margins.size() == knobs.size();
+  if (asked.all_margins) return;
+  console.warn(fmt::format("{}: these are {} of {} limits", watch.why_stop(), format_count(margins.size()),
+                           format_count(knobs.size())),
+               "raise --time-limit, or analyse a smaller workload");
+}
+
 // Reports one task or DAG in words, or the whole analysis. Returns false if that task or DAG is unknown.
-bool report(const Parts &parts, const AnalyzeOptions &options, Console &console) {
-  const std::optional<std::vector<Asked>> asked = find_asked(parts, options, console);
+bool report(const Parts &parts, const AnalyzeOptions &options, AnalysisWatch &watch, Console &console) {
+  std::optional<std::vector<Asked>> asked = find_asked(parts, options, console);
   if (!asked) return false;
+  for (std::size_t p = 0; options.sensitivity && p < parts.size(); ++p) {
+    find_margins(parts[p].analysed, watch, (*asked)[p], console);
+  }
   if (options.analysis.run.json) {
     console.print(to_text(json_of(parts, *asked, options)));
     return true;
@@ -174,18 +212,16 @@ bool report(const Parts &parts, const AnalyzeOptions &options, Console &console)
 }
 
 // Analyses the workload. After Ctrl-C, the answers of the other methods remain.
-Result<Parts> analyse_configured(const Workload &workload, const AnalyzeOptions &options, Console &console) {
-  const Result<analysis::AnalysisPlatform> configured = platform_for(workload, options.analysis, options.executor);
-  if (!configured) return tl::unexpected(configured.error());
-  const analysis::AnalysisPlatform &platform = *configured;
-  const InterruptGuard guard;
-  AnalysisWatch watch(options.analysis, console);
-  return lab::analyse_parts(workload, platform, options.executor, watch.options(), options.only);
+Result<Parts> analyse_configured(const Workload &workload, const AnalyzeOptions &options, AnalysisWatch &watch) {
+  return platform_for(workload, options.analysis, options.executor)
+      .and_then([&](const analysis::AnalysisPlatform &platform) {
+        return lab::analyse_parts(workload, platform, options.executor, watch.options(), options.only);
+      });
 }
 
 int analyze_file(const AnalyzeOptions &options, Console &console) {
   if (options.analysis.run.file.empty()) {
-    const bool wants_file = !options.explain.empty() || !options.chains.empty();
+    const bool wants_file = !options.explain.empty() || !options.chains.empty() || options.sensitivity;
     if (options.methods && !wants_file) {
       if (options.analysis.run.json) {
         console.print(to_text(methods_json()));
@@ -197,20 +233,24 @@ int analyze_file(const AnalyzeOptions &options, Console &console) {
     console.error("FILE is required", "only --methods works without it, alone or with --json");
     return kExitBad;
   }
-  if (!options.chains.empty() && options.executor != "redag") {
-    console.error("--chain is available for ReDAG-RT only, not for executor '" + options.executor + "'",
-                  "leave out --chain or --executor");
+  const char *ours = !options.chains.empty() ? "--chain" : options.sensitivity ? "--sensitivity" : nullptr;
+  if (ours != nullptr && options.executor != "redag") {
+    console.error(fmt::format("{} is available for ReDAG-RT only, not for executor '{}'", ours, options.executor),
+                  fmt::format("leave out {} or --executor", ours));
     return kExitBad;
   }
-  const std::optional<Workload> workload = load_configured(options.analysis.run, console, {.waits = true});
+  const std::optional<Workload> workload =
+      load_configured(options.analysis.run, console, {.waits = true}, options.sensitivity ? "--sensitivity" : nullptr);
   if (!workload || !takes_arguments({*lab::parse_variant(options.executor)}, options.analysis.run, console))
     return kExitBad;
-  const Result<Parts> analysed = analyse_configured(*workload, options, console);
+  const InterruptGuard guard;
+  AnalysisWatch watch(options.analysis, console);
+  const Result<Parts> analysed = analyse_configured(*workload, options, watch);
   if (!analysed) {
     console.note(analysed.error());
     return kExitBad;
   }
-  if (!report(*analysed, options, console)) return kExitBad;
+  if (!report(*analysed, options, watch, console)) return kExitBad;
   return options.analysis.run.check && !lab::is_schedulable(*analysed) ? kExitNo : kExitOk;
 }
 
@@ -239,6 +279,8 @@ Action add_analyze(CLI::App &app) {
       ->expected(1)
       ->take_all()
       ->allow_extra_args(false);
+  app.add_flag("--sensitivity", options->sensitivity,
+               "Show how far each execution time and rate can grow, or must shrink, to have every deadline shown");
   app.add_flag("--all", options->all,
                "Show all tasks and DAGs, the result of each method, and the methods that do not apply");
   add_count(app, "--effort", options->analysis.effort, {0, kMostEffort},

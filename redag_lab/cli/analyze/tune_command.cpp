@@ -21,7 +21,7 @@ namespace redag::cli {
 namespace {
 
 constexpr std::uint32_t kMostSeeds = 10'000;
-const std::vector<std::string> kSettings = {"workers", "max_active", "order", "priorities"};
+const std::vector<std::string> kSettings = {"workers", "max_active", "priorities"};
 
 struct TuneOptions {
   RunArguments run;
@@ -35,7 +35,7 @@ struct TuneOptions {
 
 // Parses "workers,max_active", the settings that may change. Returns false after printing an error.
 bool parse_vary(const std::string &list, lab::Freedom &freedom, Console &console) {
-  freedom.workers = freedom.caps = freedom.ties = freedom.priorities = false;
+  freedom.workers = freedom.caps = freedom.priorities = false;
   std::size_t begin = 0;
   while (begin <= list.size()) {
     const std::size_t end = std::min(list.find(',', begin), list.size());
@@ -44,8 +44,6 @@ bool parse_vary(const std::string &list, lab::Freedom &freedom, Console &console
       freedom.workers = true;
     } else if (name == "max_active") {
       freedom.caps = true;
-    } else if (name == "order") {
-      freedom.ties = true;
     } else if (name == "priorities") {
       freedom.priorities = true;
     } else {
@@ -98,7 +96,7 @@ int tune_file(const TuneOptions &options, Console &console) {
     return kExitBad;
   }
   tuning.options.simulation.overheads = options.run.overheads;
-  const std::string usual = by_bounds ? "max_active,priorities" : "workers,max_active,order";
+  const std::string usual = by_bounds ? "max_active,priorities" : "workers,max_active";
   if (!parse_vary(options.vary.empty() ? usual : options.vary, tuning.options.freedom, console) ||
       !parse_caps(options.caps, tuning.options.freedom, console)) {
     return kExitBad;
@@ -167,8 +165,8 @@ Action add_tune(CLI::App &app) {
              "Minimise late and lost jobs (misses) or the largest lateness (lateness), or maximise the smallest share "
              "of a deadline that is left (slack); by default misses, or lateness with the bounds as judge");
   app.add_option("--vary", options->vary,
-                 "What may change: workers, max_active, order (of DAGs with equal priority), priorities; by default "
-                 "workers,max_active,order, or max_active,priorities with the bounds as judge")
+                 "What may change: workers, max_active, priorities; by default workers,max_active, or "
+                 "max_active,priorities with the bounds as judge")
       ->type_name("LIST");
   app.add_option("--caps", options->caps,
                  "Values of max_active to try for every DAG (default: none, and all values that can matter)")

@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <span>
 
 #include "redag/base/text.hpp"
@@ -88,17 +87,6 @@ Table table_of(std::vector<Column> columns, const Tuning &tuning) {
   return Table(std::move(columns));
 }
 
-Point::const_iterator ties_of(const Workload &workload, const Point &point) {
-  return point.begin() + static_cast<std::ptrdiff_t>(SettingSpace::kCaps + workload.dags.size());
-}
-
-// Formats the tie order of the point, a Lehmer code. Zeros stand for the order of the file.
-std::string ties_text(const Workload &workload, const Point &point) {
-  const auto first = ties_of(workload, point);
-  if (std::all_of(first, point.end(), [](std::uint32_t digit) { return digit == 0; })) return "as it is";
-  return fmt::format("{}", fmt::join(first, point.end(), "."));
-}
-
 std::string scores_table(const Tuning &tuning, const StreamTraits &terminal) {
   Table table = table_of({{"", false, 9}, {"judged by", false, 3}}, tuning);
   const auto add = [&](const char *title, const char *seeds, const Score &score) {
@@ -129,17 +117,13 @@ Ranked ranked(const Tuning &tuning) {
 
 std::string trials_table(const Tuning &tuning, const Ranked &trials, const StreamTraits &terminal) {
   const Workload &workload = tuning.tuned.present.workload;
-  std::vector<Column> columns = {{"workers", true, 8}};
-  const bool has_orders = tuning.tuned.orders.size() > 1;
-  if (has_orders) columns.push_back({"priorities", false, 8});
-  columns.push_back({.title = "max_active", .importance = 9, .prose = true});
-  if (!has_orders) columns.push_back({"tie order", false, 1});
-  Table table = table_of(std::move(columns), tuning);
+  Table table = table_of(
+      {{"workers", true, 8}, {"priorities", false, 8}, {.title = "max_active", .importance = 9, .prose = true}},
+      tuning);
   for (const auto &[point, score] : trials) {
-    std::vector<Cell> cells = {{fmt::format("{}", point.front())}};
-    if (has_orders) cells.push_back({tuning.tuned.orders[point[SettingSpace::kOrder]]});
-    cells.push_back({caps_text(workload, std::span(point).subspan(SettingSpace::kCaps, workload.dags.size()))});
-    if (!has_orders) cells.push_back({ties_text(workload, point)});
+    std::vector<Cell> cells = {{fmt::format("{}", point.front())},
+                               {tuning.tuned.orders[point[SettingSpace::kOrder]]},
+                               {caps_text(workload, std::span(point).subspan(SettingSpace::kCaps))}};
     for (Cell &cell : score_cells(score)) cells.push_back(std::move(cell));
     table.add(std::move(cells));
   }
@@ -149,48 +133,14 @@ std::string trials_table(const Tuning &tuning, const Ranked &trials, const Strea
 std::string tried_tables(const Tuning &tuning, const StreamTraits &terminal, bool all) {
   const Ranked trials = ranked(tuning);
   if (trials.size() < 2) return {};
-  std::map<std::uint32_t, std::pair<Point, Score>> by_workers;
-  for (const auto &trial : trials) by_workers.emplace(trial.first.front(), trial);
-  std::string text;
-  if (by_workers.size() > 1) {
-    Ranked best;
-    for (const auto &[workers, trial] : by_workers) best.push_back(trial);
-    text +=
-        "\n"
-        "best setting for each number of workers\n" +
-        trials_table(tuning, best, terminal);
-  }
   const std::size_t shown = all ? trials.size() : std::min(trials.size(), kMostTrials);
-  text += fmt::format(
+  std::string text = fmt::format(
       "\n"
       "settings tried: {} of {}, best first\n",
       format_count(shown), format_count(trials.size()));
   text += trials_table(tuning, {trials.begin(), trials.begin() + static_cast<std::ptrdiff_t>(shown)}, terminal);
   if (shown < trials.size()) text += "(--all-trials shows all)\n";
   return text;
-}
-
-struct Pairs {
-  std::size_t better = 0;
-  std::size_t equal = 0;
-  std::size_t worse = 0;
-};
-
-// Compares the two settings seed by seed; both had the same jobs.
-Pairs compare_runs(const Tuning &tuning) {
-  Pairs pairs;
-  const std::vector<Score> &before = tuning.tuned.present.held_out_runs;
-  const std::vector<Score> &after = tuning.tuned.found.held_out_runs;
-  for (std::size_t i = 0; i < std::min(before.size(), after.size()); ++i) {
-    if (lab::improves(after[i], before[i], tuning.options.objective)) {
-      ++pairs.better;
-    } else if (lab::improves(before[i], after[i], tuning.options.objective)) {
-      ++pairs.worse;
-    } else {
-      ++pairs.equal;
-    }
-  }
-  return pairs;
 }
 
 std::string gains(const Tuning &tuning) {
@@ -206,25 +156,16 @@ std::string gains(const Tuning &tuning) {
                       : held                                ? "on unseen seeds"
                                                             : "on the seeds of the search (no validation)",
                       objective_text(before, tuning.options), objective_text(after, tuning.options));
-  if (held) {
-    const Pairs pairs = compare_runs(tuning);
-    text += fmt::format("seed by seed: {} better, {} equal, {} worse\n", pairs.better, pairs.equal, pairs.worse);
-  }
   return text;
 }
 
-Json counts_json(const Score &score) {
-  return Json{{"released", score.judged},
+Json score_json(const Score &score) {
+  return Json{{"proven", score.proven},
+              {"released", score.judged},
               {"missed", score.missed},
               {"lost", score.lost},
               {"max_lateness_ns", score.extremes.any ? Json(score.extremes.worst_lateness) : Json()},
               {"least_slack", score.extremes.any ? Json(score.extremes.least_slack) : Json()}};
-}
-
-Json score_json(const Score &score) {
-  Json json = counts_json(score);
-  json["proven"] = score.proven;
-  return json;
 }
 
 Json setting_json(const Tuning &tuning, const Point &point) {
@@ -233,16 +174,13 @@ Json setting_json(const Tuning &tuning, const Point &point) {
   for (std::size_t d = 0; d < workload.dags.size(); ++d) caps[workload.dags[d].name] = point[SettingSpace::kCaps + d];
   return Json{{"workers", point.front()},
               {"priorities", tuning.tuned.orders[point[SettingSpace::kOrder]]},
-              {"max_active", caps},
-              {"tie_order", std::vector<std::uint32_t>(ties_of(workload, point), point.end())}};
+              {"max_active", caps}};
 }
 
 Json candidate_json(const SettingCandidate &candidate, const Tuning &tuning) {
   Json json = setting_json(tuning, candidate.point);
   json["searched"] = score_json(candidate.score);
   json["held_out"] = tuning.options.held_out > 0 ? score_json(candidate.held_out) : Json();
-  json["held_out_runs"] = Json::array();
-  for (const Score &run : candidate.held_out_runs) json["held_out_runs"].push_back(counts_json(run));
   return json;
 }
 
@@ -267,11 +205,6 @@ std::string in_words(const Tuning &tuning) {
   } else {
     text += fmt::format("nothing to change: no other setting that was tried is better by {}\n",
                         to_string(tuning.options.objective));
-  }
-  if (!tuned.varies && tuning.options.judge == Judge::Simulation) {
-    text +=
-        "runs with different seeds are equal, because execution times and jitter do not vary: no validation is "
-        "needed\n";
   }
   if (!tuned.exhaustive) {
     text +=
@@ -313,7 +246,7 @@ Json to_json(const Tuning &tuning) {
     row.update(score_json(score));
     trials.push_back(std::move(row));
   }
-  return Json{{"format", "redag.tuning/2"},
+  return Json{{"format", "redag.tuning/3"},
               {"workload", tuned.present.workload.name},
               {"judge", to_string(options.judge)},
               {"objective", to_string(options.objective)},
@@ -327,7 +260,6 @@ Json to_json(const Tuning &tuning) {
               {"rejected", tuned.rejected()},
               {"exhaustive", tuned.exhaustive},
               {"stopped", tuned.stopped},
-              {"varies", tuned.varies},
               {"present", candidate_json(tuned.present, tuning)},
               {"found", candidate_json(tuned.found, tuning)},
               {"best", candidate_json(tuned.best, tuning)},

@@ -12,7 +12,6 @@
 #include "redag/base/check.hpp"
 #include "redag/base/text.hpp"
 #include "redag/trace/trace.hpp"
-#include "redag_analysis/text/table.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/files.hpp"
 #include "redag_lab/cli/terminal/options.hpp"
@@ -28,12 +27,8 @@ namespace redag::cli {
 namespace {
 
 using experiment::FinishedRun;
-using experiment::kNoLevel;
 using experiment::LoadedExperiment;
 using experiment::PlannedRun;
-using experiment::Point;
-using experiment::ResultRow;
-using experiment::Results;
 using experiment::UnitStore;
 using experiment::World;
 
@@ -45,92 +40,6 @@ struct Settings {
   std::uint32_t jobs = 0;  // 0: one per processor
   bool force = false;
 };
-
-constexpr std::size_t kMostRowsShown = 100;  // combinations
-
-// True if a point without the last factor is one of the combination: factors that do not affect it have no level.
-bool belongs(const Point &point, const Point &combination) {
-  for (std::size_t f = 0; f + 1 < point.size(); ++f) {
-    if (point[f] != kNoLevel && point[f] != combination[f]) return false;
-  }
-  return true;
-}
-
-// Returns the share over all jobs of all runs. Unlike a median, it shows a miss of a single run.
-double share_of(const ResultRow &row) {
-  return static_cast<double>(row.counts[1]) / static_cast<double>(std::max<std::uint64_t>(1, row.counts[0]));
-}
-
-// Returns the rows of all labels together: the last one of each point.
-std::vector<const ResultRow *> totals_of(const Results &results) {
-  std::vector<const ResultRow *> totals;
-  for (const ResultRow &row : results.rows) {
-    if (totals.empty() || totals.back()->point != row.point) totals.push_back(nullptr);
-    totals.back() = &row;
-  }
-  return totals;
-}
-
-std::vector<Point> combinations_of(const std::vector<const ResultRow *> &totals) {
-  std::vector<Point> combinations;
-  for (const ResultRow *row : totals) {
-    Point point = row->point;
-    point.back() = kNoLevel;
-    const auto covers = [&](const Point &other) { return belongs(point, other); };
-    if (std::any_of(combinations.begin(), combinations.end(), covers)) continue;
-    std::erase_if(combinations, [&](const Point &other) { return belongs(other, point); });
-    combinations.push_back(std::move(point));
-    if (combinations.size() == kMostRowsShown) break;
-  }
-  return combinations;
-}
-
-std::string by_combination(const Results &results, const std::vector<const ResultRow *> &totals,
-                           const std::vector<Point> &combinations, const StreamTraits &traits) {
-  std::vector<Column> columns;
-  std::vector<std::size_t> shown;
-  for (std::size_t f = 0; f + 1 < results.factors.size(); ++f) {
-    if (results.factors[f].levels.size() < 2) continue;
-    shown.push_back(f);
-    columns.push_back({results.factors[f].name, results.factors[f].numeric, 1000});
-  }
-  for (std::size_t i = 0; i < results.factors.back().levels.size(); ++i) {
-    columns.push_back(
-        {results.factors.back().levels[i], true, static_cast<unsigned>(900 - std::min<std::size_t>(i, 899))});
-  }
-  Table table(std::move(columns));
-  for (const Point &combination : combinations) {
-    std::vector<Cell> cells;
-    for (const std::size_t f : shown) {
-      cells.push_back({combination[f] == kNoLevel ? "-" : results.factors[f].levels[combination[f]]});
-    }
-    cells.resize(shown.size() + results.factors.back().levels.size(), {"-", Tint::Faint});
-    for (const ResultRow *row : totals) {
-      if (!belongs(row->point, combination) || !row->figures[0]) continue;
-      cells[shown.size() + row->point.back()] = {format_percent(share_of(*row))};
-    }
-    table.add(std::move(cells));
-  }
-  return table.render(traits.width, traits.colour);
-}
-
-// Returns a row for each of the first combinations of the factors but the last one, with the share of each level of
-// that, and what was checked.
-std::string results_table(const Results &results, const StreamTraits &traits) {
-  const std::vector<const ResultRow *> totals = totals_of(results);
-  const std::vector<Point> combinations = combinations_of(totals);
-  std::string text =
-      tinted(fmt::format("{}, of all {}", results.counts[1], results.counts[0]), Tint::Strong, traits.colour) + "\n";
-  text += by_combination(results, totals, combinations, traits);
-  if (combinations.size() == kMostRowsShown) text += "further combinations are only in the files\n";
-  text += "\n";
-  for (const experiment::Remark &remark : results.remarks) text += remark.text + "\n";
-  if (results.done < results.units) {
-    text += fmt::format("{} of {} {} are done\n", format_count(results.done), format_count(results.units),
-                        results.units_are);
-  }
-  return text;
-}
 
 /// Executes a run in any world; `program` is the one for ROS 2.
 Result<FinishedRun> drive(const PlannedRun &planned, const std::string &program) {
@@ -232,22 +141,21 @@ class Run {
     return ok(store.sync(), console_) && good;
   }
 
-  // Writes the files, prints the table, and judges.
+  // Writes the files, says what was checked, and judges.
   int show() {
     Result<experiment::Results> results = experiment_.results();
     if (!ok(results, console_)) return kExitBad;
-    std::vector<std::pair<std::string, std::string>> files = results->files;
-    files.emplace_back("results.csv", to_csv(*results));
-    files.emplace_back("results.json", to_json(*results, loaded_.plan));
-    for (const auto &[name, text] : files) {
-      if (!ok(write_text(settings_.folder + "/" + name, text), console_)) return kExitBad;
+    if (!ok(write_text(settings_.folder + "/results.csv", to_csv(*results)), console_) ||
+        !ok(write_text(settings_.folder + "/results.json", to_json(*results, loaded_.plan)), console_)) {
+      return kExitBad;
     }
-    console_.say(results_table(*results, console_.out_traits()));
-    console_.say(fmt::format("\n{0}/results.csv has all figures with their intervals; 'redag report {0}' draws them\n",
-                             settings_.folder));
+    console_.say(fmt::format("{} of {} {} are done\n", format_count(results->done), format_count(results->units),
+                             results->units_are));
     for (const experiment::Remark &remark : results->remarks) {
-      if (!remark.good) console_.error(remark.text);
+      remark.good ? console_.say(remark.text + "\n") : console_.error(remark.text);
     }
+    console_.say(fmt::format("{0}/results.csv has all figures with their intervals; 'redag report {0}' draws them\n",
+                             settings_.folder));
     return results->all_good() ? kExitOk : kExitNo;
   }
 

@@ -171,10 +171,7 @@ class Comparing {
     }
     const std::string &folder = options_.run.folder;
     if (!folder.empty()) {
-      for (const auto &[name, text] :
-           {std::pair<std::string, std::string>{"comparison.json", document}, {"comparison.csv", to_csv(compared)}}) {
-        const Result<void> written = write_text(fmt::format("{}/{}", folder, name), text);
-        if (written) continue;
+      if (const Result<void> written = write_text(folder + "/comparison.json", document); !written) {
         console_.note(written.error());
         all_written_ = false;
       }
@@ -192,7 +189,7 @@ class Comparing {
     std::string text = fmt::format(
         "\n"
         "Open these files:\n"
-        "  {}/comparison.json, comparison.csv\n"
+        "  {}/comparison.json\n"
         "      this comparison, with every repetition\n",
         folder);
     if (has_picture_) {
@@ -320,7 +317,7 @@ Action add_compare(CLI::App &app) {
     option_named(app, name).excludes(simulate);
   }
   const std::string group = "Recorded results";
-  add_number(app, "--tolerance", options->recorded.bootstrap.tolerance, {0, kMostTolerance},
+  add_number(app, "--tolerance", options->recorded.tolerance, {0, kMostTolerance},
              "Share by which response percentiles may differ and still count as equal")
       ->needs(other)
       ->group(group);

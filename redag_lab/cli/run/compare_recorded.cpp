@@ -34,12 +34,12 @@ class RecordedComparison {
 
   int run() {
     const InterruptGuard guard;
-    diffed_.options = options_.bootstrap;
+    diffed_.tolerance = options_.tolerance;
     if (!read(options_.a, diffed_.a) || !read(options_.b, diffed_.b)) return kExitBad;
     if (!compare_workloads()) return kExitBad;
     for (std::string &caveat : caveats(diffed_.a, diffed_.b)) diffed_.warnings.push_back(std::move(caveat));
     progress_.draw(1, "comparing");
-    diffed_.difference = lab::compare_sides(diffed_.a.jobs, diffed_.b.jobs, diffed_.options);
+    diffed_.difference = lab::compare_sides(diffed_.a.jobs, diffed_.b.jobs, diffed_.tolerance);
     progress_.clear();
     if (options_.json) {
       console_.print(to_text(to_json(diffed_)));

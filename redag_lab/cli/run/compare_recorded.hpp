@@ -14,8 +14,8 @@ namespace redag::cli {
 struct CompareRecordedOptions {
   std::string a;  // folders of results
   std::string b;
-  lab::BootstrapOptions bootstrap;
-  bool different = false;  // of different workloads too
+  double tolerance = 0.05;  // share by which response percentiles may differ
+  bool different = false;   // of different workloads too
   bool check = false;
   bool json = false;
   bool all_tasks = false;

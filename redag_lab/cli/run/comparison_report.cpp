@@ -204,27 +204,4 @@ Json to_json(const lab::Comparison &comparison) {
               {"warnings", comparison.warnings}};
 }
 
-std::string to_csv(const lab::Comparison &comparison) {
-  std::string text =
-      "executor,dag,repetition,released,finished,late,skipped,aborted,missed,miss_ratio,miss_ratio_with_lost,"
-      "end_to_end_late,end_to_end_p50_ns,end_to_end_p95_ns,end_to_end_p99_ns,end_to_end_max_ns\n";
-  for (const lab::ExecutorResults &results : comparison.executors) {
-    for (std::size_t r = 0; r < results.repetitions.size(); ++r) {
-      for (std::size_t dag = 0; dag + 1 < comparison.dags.size(); ++dag) {
-        const metrics::DagSummary &seen = results.repetitions[r][dag];
-        const metrics::JobCounts &jobs = seen.jobs;
-        text += fmt::format("{},{},{},{},{},{},{},{},{},{:.9g},{:.9g},{}", results.variant.name,
-                            metrics::csv_quoted(comparison.dags[dag]), r + 1, jobs.released, jobs.finished, jobs.late,
-                            jobs.skipped, jobs.aborted, jobs.missed(), jobs.miss_ratio(), jobs.miss_ratio_with_lost(),
-                            seen.end_to_end.late);
-        const metrics::Distribution &response = seen.end_to_end.response;
-        text += response.count == 0
-                    ? std::string(",,,,\n")
-                    : fmt::format(",{},{},{},{}\n", response.p50, response.p95, response.p99, response.max);
-      }
-    }
-  }
-  return text;
-}
-
 }  // namespace redag::cli

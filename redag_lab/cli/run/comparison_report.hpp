@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// A comparison in words, as a table, as JSON and as CSV. Pure functions.
+// A comparison in words, as a table, and as JSON. Pure functions.
 #pragma once
 
 #include <string>
@@ -21,7 +21,4 @@ namespace redag::cli {
 
 [[nodiscard]] std::string describe(const lab::Comparison &comparison, const StreamTraits &terminal);
 [[nodiscard]] Json to_json(const lab::Comparison &comparison);
-/// Returns a row per executor, DAG and repetition.
-[[nodiscard]] std::string to_csv(const lab::Comparison &comparison);
-
 }  // namespace redag::cli

@@ -137,15 +137,6 @@ TEST(Comparison, LateEndToEndIsAMiss) {
   EXPECT_TRUE(late.has_misses());
 }
 
-TEST(Comparison, CsvHasARowForEveryRepetitionAndQuotesNames) {
-  lab::Comparison comparison;
-  comparison.dags = {"a,\"b\"", "total"};
-  comparison.executors = {results("redag", {0.5, 0.25})};
-  const std::string text = to_csv(comparison);
-  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 3);
-  EXPECT_NE(text.find("\nredag,\"a,\"\"b\"\"\",1,1000,1000,500,0,0,500,0.5,0.5,0,"), std::string::npos) << text;
-}
-
 TEST(Comparison, JsonHasEveryRepetition) {
   lab::Comparison comparison;
   comparison.dags = {"control", "total"};

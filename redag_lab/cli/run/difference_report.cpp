@@ -7,10 +7,9 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <set>
 
 #include "redag/base/text.hpp"
+#include "redag/base/words.hpp"
 #include "redag/trace/worker_count.hpp"
 #include "redag_analysis/text/table.hpp"
 
@@ -22,21 +21,22 @@ using lab::DifferenceSide;
 using lab::FigureDifference;
 using lab::Verdict;
 
-struct Figure {
-  const char *name;
-  FigureDifference lab::RowDifference::*value;
-  Verdict DifferenceRow::*verdict;
-};
-constexpr std::array<Figure, 4> kFigures = {{{"missed", &lab::RowDifference::miss_ratio, &DifferenceRow::miss},
-                                             {"p50", &lab::RowDifference::p50, &DifferenceRow::p50},
-                                             {"p95", &lab::RowDifference::p95, &DifferenceRow::p95},
-                                             {"p99", &lab::RowDifference::p99, &DifferenceRow::p99}}};
+// The figures of a row, in the order of the table: the misses, then the percentiles of response times.
+constexpr std::array kFigures = {"missed", "p50", "p95", "p99"};
+constexpr std::size_t kMissed = 0;
 
-bool is_miss(const Figure &figure) { return figure.value == &lab::RowDifference::miss_ratio; }
+const FigureDifference &figure_of(const DifferenceRow &row, std::size_t figure) {
+  return figure == kMissed ? row.miss_ratio : row.responses[figure - 1];
+}
+
+// False of response times where no job has one: of all jobs together, or of a DAG with several sinks.
+bool exists(const DifferenceRow &row, std::size_t figure) {
+  return figure == kMissed || row.a->has_responses() || row.b->has_responses();
+}
 
 // Returns the text of one side's figure: a response time, or misses with their count.
-std::string value_text(const Figure &figure, const DifferenceSide::Row &side, double value) {
-  if (is_miss(figure)) return format_count_and_share(side.jobs.missed(), side.jobs.released);
+std::string value_text(std::size_t figure, const DifferenceSide::Row &side, double value) {
+  if (figure == kMissed) return format_count_and_share(side.jobs.missed(), side.jobs.released);
   return side.has_responses() ? humanize_duration(static_cast<Duration>(value)) : "-";
 }
 
@@ -57,21 +57,9 @@ Tint tint_of(Verdict verdict) {
 
 std::string arrow(const std::string &a, const std::string &b) { return a == b ? a : a + " -> " + b; }
 
-Cell figure_cell(const DifferenceRow &row, const Figure &figure) {
-  const FigureDifference &value = row.figures.*figure.value;
-  const Verdict verdict = row.*figure.verdict;
-  const bool differs = verdict == Verdict::Better || verdict == Verdict::Worse;
-  return Cell{arrow(value_text(figure, *row.a, value.a), value_text(figure, *row.b, value.b)) + (differs ? " *" : ""),
-              tint_of(verdict)};
-}
-
-std::string signed_time(double value) {
-  return (value < 0 ? "-" : "+") + humanize_duration(static_cast<Duration>(std::abs(value)));
-}
-
-std::string change_text(const Figure &figure, const FigureDifference &value) {
-  if (is_miss(figure)) return fmt::format("{:+.2f} to {:+.2f} percentage points", 100 * value.low, 100 * value.high);
-  return fmt::format("{} to {}", signed_time(value.low), signed_time(value.high));
+std::string figure_text(const DifferenceRow &row, std::size_t figure) {
+  const FigureDifference &value = figure_of(row, figure);
+  return arrow(value_text(figure, *row.a, value.a), value_text(figure, *row.b, value.b));
 }
 
 std::string run_words(const DiffSide &side) {
@@ -83,24 +71,13 @@ std::string run_words(const DiffSide &side) {
                      humanize_duration(first.end - first.start));
 }
 
-std::string longest_text(const DifferenceSide::Row &side) {
-  return side.has_responses() ? humanize_duration(side.max) : "-";
-}
-
-bool differs(const DifferenceRow &row) { return row.is_any(Verdict::Better) || row.is_any(Verdict::Worse); }
-
-// All jobs together, what differs, and the DAGs of tasks that differ.
-bool is_shown(const DifferenceRow &row, const std::vector<DifferenceRow> &rows) {
-  if (row.a->dag.empty() || differs(row)) return true;
-  return row.a->task.empty() && std::any_of(rows.begin(), rows.end(), [&](const DifferenceRow &other) {
-           return other.a->dag == row.a->dag && differs(other);
-         });
-}
-
+// Counts the figures of this verdict. Response times count only where some job has one.
 std::size_t count_of(const Diffed &diffed, Verdict wanted) {
   std::size_t count = 0;
   for (const DifferenceRow &row : diffed.difference.rows) {
-    for (const Figure &figure : kFigures) count += row.*figure.verdict == wanted ? 1 : 0;
+    for (std::size_t f = 0; f < kFigures.size(); ++f) {
+      if (exists(row, f) && figure_of(row, f).verdict == wanted) ++count;
+    }
   }
   return count;
 }
@@ -115,11 +92,11 @@ std::string conclusion(const Diffed &diffed) {
   };
   const std::string misses = fmt::format("{} instead of {} of all jobs", missed(*all.b), missed(*all.a));
   std::string text;
-  switch (all.miss) {
+  switch (all.miss_ratio.verdict) {
     case Verdict::Better: text = fmt::format("B misses fewer deadlines than A: {}", misses); break;
     case Verdict::Worse: text = fmt::format("B misses more deadlines than A: {}", misses); break;
     case Verdict::Same: text = fmt::format("A and B miss equally many deadlines: {}", misses); break;
-    case Verdict::NotTested: text = fmt::format("Too few jobs to compare the misses: {}", misses); break;
+    case Verdict::NotTested: text = fmt::format("Too few repetitions to compare the misses: {}", misses); break;
   }
   if (better + worse == 0) return text + "; no figure differs significantly";
   const auto counted = [](std::size_t count, const char *what) {
@@ -128,113 +105,56 @@ std::string conclusion(const Diffed &diffed) {
   return fmt::format("{}; {}, {}", text, counted(better, "better"), counted(worse, "worse"));
 }
 
-std::string differences_table(const Diffed &diffed, const StreamTraits &terminal, bool all) {
-  Table table({{"", false, 9},
-               {"jobs", true, 2},
-               {"missed", true, 8},
-               {"lost", true, 1},
-               {"p50", true, 3},
-               {"p95", true, 4},
-               {"p99", true, 6},
-               {"max", true, 5}});
-  std::size_t left_out = 0;
-  for (const DifferenceRow &row : diffed.difference.rows) {
-    if (!all && !is_shown(row, diffed.difference.rows)) {
-      ++left_out;
-      continue;
-    }
-    const std::string indent = row.a->task.empty() ? "" : "  ";
-    table.add({{indent + (row.a->task.empty() ? row_name(row) : row.a->task),
-                row.a->dag.empty() ? Tint::Strong : Tint::Plain},
-               {arrow(format_count(row.a->jobs.released), format_count(row.b->jobs.released)), Tint::Faint},
-               figure_cell(row, kFigures[0]),
-               {arrow(format_count(row.a->jobs.lost()), format_count(row.b->jobs.lost()))},
-               figure_cell(row, kFigures[1]),
-               figure_cell(row, kFigures[2]),
-               figure_cell(row, kFigures[3]),
-               {arrow(longest_text(*row.a), longest_text(*row.b)), Tint::Faint}});
-  }
-  std::string text = table.render(terminal.width, terminal.colour);
-  if (left_out > 0)
-    text += fmt::format("({} row{} without a difference; --all-tasks shows all)\n", left_out, left_out == 1 ? "" : "s");
-  return text;
-}
-
-// Returns every figure that differs by more than chance, beginning with those that agree with the conclusion.
-std::string findings(const Diffed &diffed, const StreamTraits &terminal) {
+// Returns the figures that differ by more than chance, first those that agree with the conclusion; `all`: every figure.
+std::string findings(const Diffed &diffed, const StreamTraits &terminal, bool all) {
+  const bool is_better = diffed.difference.rows.front().miss_ratio.verdict == Verdict::Better;
+  std::vector<Verdict> shown = {is_better ? Verdict::Better : Verdict::Worse,
+                                is_better ? Verdict::Worse : Verdict::Better};
+  if (all) shown.insert(shown.end(), {Verdict::Same, Verdict::NotTested});
   std::string text;
-  const bool is_better = diffed.difference.rows.front().miss == Verdict::Better;
-  for (const Verdict wanted :
-       {is_better ? Verdict::Better : Verdict::Worse, is_better ? Verdict::Worse : Verdict::Better}) {
+  for (const Verdict wanted : shown) {
     for (const DifferenceRow &row : diffed.difference.rows) {
-      for (const Figure &figure : kFigures) {
-        if (row.*figure.verdict != wanted) continue;
-        const FigureDifference &value = row.figures.*figure.value;
-        text += fmt::format("{} {}: {} {} -> {} ({})\n", tinted(to_string(wanted), tint_of(wanted), terminal.colour),
-                            row_name(row), figure.name, value_text(figure, *row.a, value.a),
-                            value_text(figure, *row.b, value.b), change_text(figure, value));
+      for (std::size_t f = 0; f < kFigures.size(); ++f) {
+        if (!exists(row, f) || figure_of(row, f).verdict != wanted) continue;
+        text += fmt::format("{} {}: {} {}\n", tinted(to_string(wanted), tint_of(wanted), terminal.colour),
+                            row_name(row), kFigures[f], figure_text(row, f));
       }
     }
   }
+  const std::size_t hidden = all ? 0 : count_of(diffed, Verdict::Same) + count_of(diffed, Verdict::NotTested);
+  if (hidden > 0) text += fmt::format("({} without a difference; --all-tasks shows all)\n", plural(hidden, "figure"));
   return text;
-}
-
-// True if a figure of the row was not tested. Response times count only where some job has one.
-bool is_untested(const DifferenceRow &row) {
-  const bool has_times = row.a->has_responses() || row.b->has_responses();
-  return std::any_of(kFigures.begin(), kFigures.end(), [&](const Figure &figure) {
-    return (is_miss(figure) || has_times) && row.*figure.verdict == Verdict::NotTested;
-  });
 }
 
 std::vector<std::string> cautions(const Diffed &diffed) {
   std::vector<std::string> list = diffed.warnings;
-  std::size_t untested = 0;
-  std::vector<std::string> correlated;
-  for (const DifferenceRow &row : diffed.difference.rows) {
-    if (is_untested(row)) ++untested;
-    // Intervals that are too narrow find differences, and hide none.
-    if (row.is_correlated() && differs(row)) correlated.push_back(row_name(row));
-  }
+  const std::size_t untested = count_of(diffed, Verdict::NotTested);
   // What was found does not become doubtful by what was not tested.
   const bool is_any = diffed.difference.is_any(Verdict::Better) || diffed.difference.is_any(Verdict::Worse);
   if (untested > 0 && !is_any) {
-    list.push_back(fmt::format(
-        "{} of {} rows have figures that were not tested, because jobs are few or runs are short; run for longer",
-        untested, diffed.difference.rows.size()));
-  }
-  if (!correlated.empty()) {
-    list.push_back(fmt::format(
-        "{}{}: jobs are correlated beyond the blocks of time that are compared, so the intervals are too narrow; run "
-        "for longer",
-        correlated.front(), correlated.size() > 1 ? fmt::format(" and {} more", correlated.size() - 1) : ""));
+    list.push_back(fmt::format("{} not tested, because jobs or repetitions are few; run for longer, or more often",
+                               plural(untested, "figure")));
   }
   return list;
 }
 
-Json figure_json(const DifferenceRow &row, const Figure &figure) {
-  const FigureDifference &value = row.figures.*figure.value;
-  const bool tested = value.tested;
+Json figure_json(const DifferenceRow &row, std::size_t f) {
+  const FigureDifference &figure = figure_of(row, f);
   const auto of_side = [&](const DifferenceSide::Row &side, double number) {
-    return is_miss(figure) || side.has_responses() ? Json(number) : Json();
+    return f == kMissed || side.has_responses() ? Json(number) : Json();
   };
-  return Json{{"a", of_side(*row.a, value.a)},
-              {"b", of_side(*row.b, value.b)},
-              {"difference_low", tested ? Json(value.low) : Json()},
-              {"difference_high", tested ? Json(value.high) : Json()},
-              {"p", tested ? Json(value.p()) : Json()},
-              {"verdict", to_string(row.*figure.verdict)}};
+  return Json{{"a", of_side(*row.a, figure.a)},
+              {"b", of_side(*row.b, figure.b)},
+              {"p", figure.p ? Json(*figure.p) : Json()},
+              {"verdict", to_string(figure.verdict)}};
 }
 
 Json counts_json(const DifferenceSide::Row &row) {
-  std::size_t blocks = 0;
-  for (const auto &run : row.runs) blocks += run.size();
   return Json{{"released", row.jobs.released},
               {"late", row.jobs.late},
               {"lost", row.jobs.lost()},
               {"missed", row.jobs.missed()},
-              {"max_ns", row.has_responses() ? Json(row.max) : Json()},
-              {"blocks", blocks}};
+              {"max_ns", row.has_responses() ? Json(row.max) : Json()}};
 }
 
 Json side_json(const DiffSide &side) {
@@ -269,10 +189,15 @@ std::vector<std::string> caveats(const DiffSide &a, const DiffSide &b) {
     list.push_back(fmt::format("the sides were charged different overheads: {}, and {}", said(x), said(y)));
   }
   const std::size_t fewest = std::min(a.jobs.runs().size(), b.jobs.runs().size());
-  if (fewest == 1 && (x.driver != trace::Driver::Simulator || y.driver != trace::Driver::Simulator)) {
-    list.emplace_back(
-        "one side has a single run: its intervals do not include the variation between runs on this machine; use "
-        "several runs ('redag compare --repeat')");
+  const bool is_simulated = x.driver == trace::Driver::Simulator && y.driver == trace::Driver::Simulator;
+  if (fewest < lab::kFewestRuns && !is_simulated) {
+    list.push_back(fmt::format(
+        "one side has fewer than {} runs: stretches of time are compared, which do not vary as runs on this "
+        "machine do; use several runs ('redag compare --repeat {}')",
+        lab::kFewestRuns, lab::kFewestRuns));
+  }
+  if (x.end - x.start != y.end - y.start) {
+    list.emplace_back("the runs differ in length: percentiles of long and of short ones are less comparable");
   }
   for (const DiffSide *side : {&a, &b}) {
     const auto &runs = side->jobs.runs();
@@ -288,14 +213,12 @@ std::string describe(const Diffed &diffed, const StreamTraits &terminal, bool al
                      "\nB  " + run_words(diffed.b) + "\n";
   for (const lab::Change &change : diffed.changes)
     text += tinted("differs ", Tint::Strong, terminal.colour) + change.text() + "\n";
-  text += "\n" + differences_table(diffed, terminal, all) + "\n" + findings(diffed, terminal);
+  text += "\n" + findings(diffed, terminal, all) + "\n";
   text += fmt::format(
-      "* significant{}; {} tests; false discovery rate 5 %; 95 % intervals from blocks of time; max is not tested; "
-      "times: of a task, finish - release; of a DAG with one sink, end to end; shares: of the jobs of that side\n",
-      diffed.options.tolerance > 0
-          ? fmt::format(", and for response times by more than {:g} %", 100 * diffed.options.tolerance)
-          : "",
-      diffed.difference.tests);
+      "better, worse: by more than chance{} (rank sums of {}, false discovery rate 5 %)\n"
+      "times: of a task, finish - release; of a DAG with one sink, end to end\n",
+      diffed.tolerance > 0 ? fmt::format(", and for response times by more than {:g} %", 100 * diffed.tolerance) : "",
+      diffed.difference.of_runs ? "runs" : "stretches of time");
   for (const std::string &caution : cautions(diffed)) {
     text += tinted("caution: ", Tint::Caution, terminal.colour) + caution + "\n";
   }
@@ -313,24 +236,23 @@ Json to_json(const Diffed &diffed) {
   Json rows = Json::array();
   for (const DifferenceRow &row : diffed.difference.rows) {
     Json figures = Json::object();
-    for (const Figure &figure : kFigures) {
-      figures[is_miss(figure) ? "miss_ratio_with_lost" : std::string(figure.name) + "_ns"] = figure_json(row, figure);
+    for (std::size_t f = 0; f < kFigures.size(); ++f) {
+      figures[f == kMissed ? "miss_ratio_with_lost" : std::string(kFigures[f]) + "_ns"] = figure_json(row, f);
     }
     rows.push_back(Json{{"dag", row.a->dag.empty() ? Json() : Json(row.a->dag)},
                         {"task", row.a->task.empty() ? Json() : Json(row.a->task)},
                         {"a", counts_json(*row.a)},
                         {"b", counts_json(*row.b)},
-                        {"figures", figures},
-                        {"block_correlation", row.figures.block_correlation},
-                        {"is_correlated", row.is_correlated()}});
+                        {"figures", figures}});
   }
-  return Json{{"format", "redag.difference/2"},
+  return Json{{"format", "redag.difference/3"},
               {"a", side_json(diffed.a)},
               {"b", side_json(diffed.b)},
               {"changes", changes},
               {"worse", diffed.difference.is_any(Verdict::Worse)},
               {"better", diffed.difference.is_any(Verdict::Better)},
-              {"tolerance", diffed.options.tolerance},
+              {"tolerance", diffed.tolerance},
+              {"samples", diffed.difference.of_runs ? "runs" : "stretches"},
               {"tests", diffed.difference.tests},
               {"p_threshold", diffed.difference.threshold},
               {"rows", rows},

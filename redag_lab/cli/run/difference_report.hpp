@@ -26,7 +26,7 @@ struct Diffed {
   DiffSide b;
   std::vector<lab::Change> changes;  // between the workloads
   lab::Difference difference;
-  lab::BootstrapOptions options;
+  double tolerance = 0.05;  // of compare_sides()
   std::vector<std::string> warnings;
 };
 
@@ -36,7 +36,7 @@ struct Diffed {
 /// `all`: a row for every task, not only for those with a difference.
 [[nodiscard]] std::string describe(const Diffed &diffed, const StreamTraits &terminal, bool all);
 
-/// Returns `redag.difference/2`.
+/// Returns `redag.difference/3`.
 [[nodiscard]] Json to_json(const Diffed &diffed);
 
 }  // namespace redag::cli

@@ -20,12 +20,8 @@ struct GenerateOptions {
   lab::GenerateOptions generate;
   std::uint64_t seed = 1;
   std::string file;
-  std::string folder;
-  std::uint32_t count = 1;
-  bool force = false;
 };
 
-constexpr std::uint32_t kMaxCount = 1'000'000;
 constexpr double kLeastShare = 1e-9;  // minimum of options that must be above 0
 
 void add_structure(CLI::App &app, lab::GenerateOptions &g) {
@@ -56,9 +52,6 @@ void add_platform(CLI::App &app, lab::GenerateOptions &g) {
   add_choice(app, "--preemption", g.preemption, preemption_choices(), "Preemption mode")
       ->default_str(to_string(g.preemption))
       ->group(group);
-  add_choice(app, "--policy", g.policy, policy_choices(), "Scheduling policy")
-      ->default_str(to_string(g.policy))
-      ->group(group);
 }
 
 // Returns the command that generates this workload again, as a comment for its first line.
@@ -66,10 +59,7 @@ std::string provenance(const CLI::App &app, std::uint64_t seed) {
   std::string line = "# redag generate";
   for (const CLI::Option *option : app.get_options()) {
     const std::string name = option->get_name();
-    if (option->count() == 0 || name == "--seed" || name == "--count" || name == "--out" || name == "--force" ||
-        name == "--output") {
-      continue;
-    }
+    if (option->count() == 0 || name == "--seed" || name == "--output") continue;
     line += " " + name;
     if (option->get_expected_min() > 0) line += " " + option->results().back();
   }
@@ -90,56 +80,23 @@ std::string in_options(const CLI::App &app, const std::string &message) {
   return text;
 }
 
-int generate_workloads(const CLI::App &app, const GenerateOptions &options, Console &console) {
-  if (options.count > 1 && options.folder.empty()) {
-    console.error("--count needs --out DIR, because one file holds one workload");
+int generate_workload(const CLI::App &app, const GenerateOptions &options, Console &console) {
+  const Result<Workload> workload = generate(options.generate, options.seed);
+  if (!workload) {
+    for (const Diagnostic &mistake : workload.error()) console.error(in_options(app, mistake.message), mistake.hint);
     return kExitBad;
   }
-  if (options.seed + (options.count - 1) < options.seed) {
-    console.error("--seed and --count: the last seed is not below 2^64", "choose a smaller first seed");
+  const std::string text = provenance(app, options.seed) + to_yaml(*workload);
+  if (options.file.empty()) {
+    console.print(text);
+    return kExitOk;
+  }
+  const Result<void> written = check_output(options.file).and_then([&] { return write_text(options.file, text); });
+  if (!written) {
+    console.note(written.error());
     return kExitBad;
   }
-  if (!options.folder.empty() && !options.file.empty()) {
-    console.error("-o and --out exclude each other: use -o for one file, --out for a folder");
-    return kExitBad;
-  }
-  if (!options.file.empty()) {
-    if (const Result<void> writable = check_output(options.file); !writable) {
-      console.note(writable.error());
-      return kExitBad;
-    }
-  }
-  if (!options.folder.empty()) {
-    if (const Result<void> made = prepare_folder(options.folder, options.force); !made) {
-      console.note(made.error());
-      return kExitBad;
-    }
-  }
-  for (std::uint32_t i = 0; i < options.count; ++i) {
-    const std::uint64_t seed = options.seed + i;
-    const Result<Workload> workload = generate(options.generate, seed);
-    if (!workload) {
-      for (const Diagnostic &mistake : workload.error()) console.error(in_options(app, mistake.message), mistake.hint);
-      return kExitBad;
-    }
-    const std::string text = provenance(app, seed) + to_yaml(*workload);
-    if (options.folder.empty() && options.file.empty()) {
-      console.print(text);
-      continue;
-    }
-    const std::string file =
-        options.folder.empty() ? options.file : fmt::format("{}/workload-{}.yaml", options.folder, seed);
-    if (const Result<void> written = write_text(file, text); !written) {
-      console.note(written.error());
-      return kExitBad;
-    }
-  }
-  if (!options.file.empty()) console.note(fmt::format("wrote {}\n", options.file));
-  if (!options.folder.empty()) {
-    console.note(fmt::format("wrote {} workload{} to {}: seeds {} to {}\n", options.count,
-                             options.count == 1 ? "" : "s", options.folder, options.seed,
-                             options.seed + options.count - 1));
-  }
+  console.note(fmt::format("wrote {}\n", options.file));
   return kExitOk;
 }
 
@@ -149,15 +106,10 @@ Action add_generate(CLI::App &app) {
   auto options = std::make_shared<GenerateOptions>();
   add_seed(app, options->seed, "Seed; the same options and seed give the same workload everywhere");
   app.add_option("-o,--output", options->file, "File to write (default: standard output)")->type_name("FILE");
-  add_count(app, "--count", options->count, {1, kMaxCount},
-            "Number of workloads to generate, with seeds SEED, SEED+1, ...; needs --out");
-  CLI::Option *folder =
-      app.add_option("--out", options->folder, "Folder for the files workload-SEED.yaml")->type_name("DIR");
-  app.add_flag("--force", options->force, "Write into a folder that holds other files")->needs(folder);
   add_structure(app, options->generate);
   add_timing(app, options->generate);
   add_platform(app, options->generate);
-  return [options, &app](Console &console) { return generate_workloads(app, *options, console); };
+  return [options, &app](Console &console) { return generate_workload(app, *options, console); };
 }
 
 }  // namespace redag::cli

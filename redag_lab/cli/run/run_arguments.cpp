@@ -68,7 +68,6 @@ void add_workload_arguments(CLI::App &app, RunArguments &arguments, const char *
   app.add_option("FILE", arguments.file, file_help)->type_name("WORKLOAD")->required();
   add_duration(app, "--duration", arguments.duration, "Length of the run: the time in which jobs are released");
   add_duration(app, "--warm-up", arguments.warm_up, "Do not count jobs released in this time at the start", true);
-  add_duration(app, "--warmup", arguments.warm_up, "Former name of --warm-up", true)->group("");  // not in --help
   add_seed(app, arguments.seed, "Seed of execution times and jitter; every executor gets the same jobs");
   add_platform_arguments(app, arguments);
 }
@@ -219,16 +218,11 @@ bool takes_arguments(const std::vector<lab::Variant> &variants, const RunArgumen
                   "leave --preemption out, or choose the executor 'redag'");
     return false;
   }
-  if (arguments.policy && none([](const lab::Variant &variant) { return variant.is_redag(); })) {
-    console.error(fmt::format("--policy {}: executor '{}' has a fixed order of its own", to_string(*arguments.policy),
-                              first.name),
-                  "leave --policy out, or choose the executor 'redag'");
-    return false;
-  }
-  if (arguments.ties && none([](const lab::Variant &variant) { return variant.is_redag(); })) {
-    console.error(
-        fmt::format("--ties {}: executor '{}' has a fixed order of its own", to_string(*arguments.ties), first.name),
-        "leave --ties out, or choose the executor 'redag'");
+  if ((arguments.policy || arguments.ties) && none([](const lab::Variant &variant) { return variant.is_redag(); })) {
+    const char *option = arguments.policy ? "--policy" : "--ties";
+    const std::string value = arguments.policy ? to_string(*arguments.policy) : to_string(*arguments.ties);
+    console.error(fmt::format("{} {}: executor '{}' has a fixed order of its own", option, value, first.name),
+                  fmt::format("leave {} out, or choose the executor 'redag'", option));
     return false;
   }
   const auto has_workers = [](const lab::Variant &variant) {

@@ -88,10 +88,10 @@ void add_thread_arguments(CLI::App &app, RunArguments &arguments);
 [[nodiscard]] std::optional<lab::SessionOptions> session_options(const RunArguments &arguments, trace::Driver driver,
                                                                  Duration default_duration, Console &console);
 
-/// Draws `progress` over a session of `duration`: the time, and the DAGs with misses.
 /// The files that a run writes into `folder`; "": none.
 [[nodiscard]] metrics::FilesOptions files_options(const RunArguments &arguments, const std::string &folder);
 
+/// Draws `progress` over a session of `duration`: the time, and the DAGs with misses.
 [[nodiscard]] lab::ProgressHook progress_hook(Progress &progress, const Workload &workload, Duration duration);
 
 }  // namespace redag::cli

@@ -15,7 +15,6 @@
 #include "redag_analysis/metrics/verdict.hpp"
 #include "redag_analysis/text/table.hpp"
 #include "redag_lab/cli/run/bound_report.hpp"
-#include "redag_lab/run/picture.hpp"
 
 namespace redag::cli {
 namespace {

@@ -50,7 +50,7 @@ is a miss. Ctrl-C ends the run early and shows the results so far.
 Examples:
   ros2 run redag_rclcpp_lab run_workload workloads/hello.yaml --executor mte,ste
   ros2 run redag_rclcpp_lab run_workload workloads/hello.yaml --out results
-  redag check-trace results/scheduler_events.redag
+  redag events --check results/scheduler_events.redag
 
 Exit status: 0 success; 1 a trace breaks rules of the model; 2 bad input, or
 the machine or ROS 2 refused the run.)";
