@@ -4,8 +4,7 @@
 #include "redag_analysis/metrics/perfetto.hpp"
 
 #include <algorithm>
-#include <array>
-#include <optional>
+#include <map>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -13,24 +12,16 @@
 #include "redag/model/clusters.hpp"
 #include "redag_analysis/metrics/deadline_watch.hpp"
 #include "redag_analysis/metrics/perfetto_packets.hpp"
-#include "redag_analysis/metrics/perfetto_tracks.hpp"
 
 namespace redag::metrics {
 namespace {
 
 using perfetto::Argument;
-using perfetto::ArgumentName;
-using perfetto::ArgumentText;
-using perfetto::Category;
-using perfetto::Counters;
-using perfetto::EventName;
-using perfetto::Lanes;
+using perfetto::Flows;
 using perfetto::PacketWriter;
-using perfetto::SliceDetails;
-using perfetto::SliceTrack;
 using perfetto::Track;
 
-const char *to_text(Miss miss) {
+std::string_view to_text(Miss miss) {
   switch (miss) {
     case Miss::None: return "none";
     case Miss::Lost: return "lost";
@@ -40,17 +31,14 @@ const char *to_text(Miss miss) {
   return "?";
 }
 
+Argument number_of(std::uint32_t job) { return {"job", std::int64_t{job}}; }
+
 }  // namespace
 
 class PerfettoWriter::Impl {
  public:
   Impl(trace::OutputFile file, const trace::RunInfo &run)
-      : writer_(std::move(file)),
-        run_(run),
-        refs_(flatten(run.workload)),
-        watch_(run.workload),
-        counters_(writer_),
-        last_time_(run.start) {
+      : writer_(std::move(file)), run_(run), refs_(flatten(run.workload)), watch_(run.workload), last_time_(run.start) {
     write_run();
     add_workers();
     add_tasks();
@@ -59,27 +47,26 @@ class PerfettoWriter::Impl {
   void add(const JobEvent &event) {
     if (event.task.value >= tasks_.size()) return;
     last_time_ = std::max(last_time_, event.time);
-    counters_.advance(since_start(last_time_));
     watch_.add(std::span(&event, 1), [&](const JudgedJob &judged) { finish(event, judged); });
     if (event.kind == JobEventKind::Released) return release(event);
     if (is_mode_change(event.kind)) {
       return mark(event, event.kind == JobEventKind::HighMode ? "HI mode begins" : "HI mode ends");
     }
-    Live *const job = find(event);
+    Live *const job = find(event.task, event.job);
     if (job == nullptr) return;
     switch (event.kind) {
       case JobEventKind::Ready: become_ready(event, *job); break;
       case JobEventKind::Deferred: mark(event, "deferred"); break;
       case JobEventKind::Exceeded: mark(event, "budget used"); break;
       case JobEventKind::Dispatched:
-        if (!std::exchange(job->started, true)) count(dag_of(event.task).active, 1);
+        if (!std::exchange(job->is_started, true)) count(dag_of(event.task).active, 1);
         leave_ready(*job);
         open_slice(event, *job);
         break;
       case JobEventKind::Resumed: open_slice(event, *job); break;
-      case JobEventKind::Preempted: close_slice(*job, event.time, {}); break;
+      case JobEventKind::Preempted: close_slice(*job, event.time); break;
       case JobEventKind::Waits:
-        close_slice(*job, event.time, {});
+        close_slice(*job, event.time);
         mark(event, waits_for(event.value));
         break;
       case JobEventKind::Served: mark(event, "served"); break;
@@ -89,12 +76,11 @@ class PerfettoWriter::Impl {
   }
 
   Result<void> commit(Time end) {
-    end = std::max(end, last_time_);
-    watch_.finish(end, [&](const JudgedJob &judged) {
+    last_time_ = std::max(end, last_time_);
+    watch_.finish(last_time_, [&](const JudgedJob &judged) {
       const TaskId task = judged.record.task;
-      if (Live *const job = find(task, judged.record.number); job != nullptr) close(*job, task, end, end, judged);
+      if (Live *const job = find(task, judged.record.number); job != nullptr) close(*job, task, last_time_, judged);
     });
-    counters_.advance(kNever);
     return writer_.commit();
   }
 
@@ -102,123 +88,103 @@ class PerfettoWriter::Impl {
   struct Live {
     std::uint32_t number = 0;
     std::size_t lane = 0;
-    bool ready = false;
-    bool started = false;
+    bool is_ready = false;
+    bool is_started = false;
     std::uint32_t worker = WorkerId::kNoneValue;  // on which it has an open slice
-    std::vector<std::uint64_t> flows_in;          // of the data that it will use
+    std::vector<std::uint64_t> flows;             // of the data that it will use
   };
   struct Worker {
-    SliceTrack slices;
+    Track track;
     TaskId task;  // of the open slice
     std::uint32_t number = 0;
   };
   struct TaskState {
-    EventName name = EventName::None;
-    Category category = Category::None;
-    Lanes lanes;
-    std::vector<Live> live;
-    std::vector<std::uint32_t> successors;    // tasks that use its data
-    std::vector<std::uint64_t> data;          // by successor: arrow from the last finished job; 0: it is drawn
-    std::vector<std::uint32_t> place_before;  // by predecessor: this task's place among its successors
+    std::uint64_t parent = 0;               // the track of its DAG
+    std::vector<Track> lanes;               // as many as jobs overlap, of one name, which Perfetto draws as one
+    std::vector<Live> live;                 // jobs
+    std::vector<std::uint32_t> successors;  // tasks that use its data
+  };
+  struct Counter {
+    std::uint64_t track = 0;
+    std::int64_t value = 0;
   };
   struct DagCounters {
-    std::size_t active = 0;
-    std::size_t misses = 0;
+    Counter active;
+    Counter misses;
   };
 
   // The beginning of the run is time 0 of the file.
   [[nodiscard]] Time since_start(Time time) const { return std::max<Duration>(time - run_.start, 0); }
-  [[nodiscard]] const DagCounters &dag_of(TaskId task) const { return dags_[refs_[task.value].dag.value]; }
+  [[nodiscard]] DagCounters &dag_of(TaskId task) { return dags_[refs_[task.value].dag.value]; }
 
   Live *find(TaskId task, std::uint32_t number) {
-    for (Live &job : tasks_[task.value].live) {
-      if (job.number == number) return &job;
-    }
-    return nullptr;
+    std::vector<Live> &live = tasks_[task.value].live;
+    const auto job = std::find_if(live.begin(), live.end(), [&](const Live &one) { return one.number == number; });
+    return job == live.end() ? nullptr : &*job;
   }
-  Live *find(const JobEvent &event) { return find(event.task, event.job); }
 
-  void count(std::size_t counter, std::int64_t by) { counters_.change(counter, by, since_start(last_time_)); }
+  void count(Counter &counter, std::int64_t by) {
+    writer_.count(counter.track, since_start(last_time_), counter.value += by);
+  }
 
   // States what the run was, as an event at its beginning.
   void write_run() {
-    const Track track = writer_.add_track("run " + run_.workload.name);
     const Provenance &from = run_.provenance;
-    const auto argument = [&](const char *name, const std::string &value) {
-      return Argument(writer_.argument_name(name), std::string_view(value));
-    };
-    const std::string policy = to_string(run_.config.policy);
-    const std::string driver = to_string(run_.driver);
-    std::vector<Argument> arguments = {argument("executor", run_.executor), argument("policy", policy),
-                                       argument("preemption", run_.preemption), argument("driver", driver)};
-    arguments.emplace_back(writer_.argument_name("seed"), static_cast<std::int64_t>(run_.seed));
-    arguments.emplace_back(writer_.argument_name("lost_events"), static_cast<std::int64_t>(run_.lost_events));
+    std::vector<Argument> arguments = {{"executor", run_.executor},
+                                       {"policy", to_string(run_.config.policy)},
+                                       {"preemption", run_.preemption},
+                                       {"driver", to_string(run_.driver)},
+                                       {"seed", static_cast<std::int64_t>(run_.seed)},
+                                       {"lost_events", static_cast<std::int64_t>(run_.lost_events)}};
     if (from.is_known()) {
-      for (const Argument &one :
-           {argument("created", from.created), argument("version", from.version), argument("revision", from.revision),
-            argument("host", from.host), argument("kernel", from.kernel), argument("command", from.command),
-            argument("calibration", from.calibration)}) {
+      for (const Argument &one : std::initializer_list<Argument>{{"created", from.created},
+                                                                 {"version", from.version},
+                                                                 {"revision", from.revision},
+                                                                 {"host", from.host},
+                                                                 {"kernel", from.kernel},
+                                                                 {"command", from.command},
+                                                                 {"calibration", from.calibration}}) {
         arguments.push_back(one);
       }
     }
-    writer_.instant(track, 0, writer_.event_name("run"), arguments);
+    writer_.instant(writer_.add_track("run " + run_.workload.name), 0, "run", arguments);
   }
 
   void add_workers() {
-    workers_track_ = writer_.add_track("workers (" + run_.executor + ", " + run_.preemption + ")");
-    ready_ = counters_.add(writer_.add_counter("ready jobs", workers_track_));
-    std::unordered_map<std::uint32_t, std::string> clusters;
+    workers_track_ = writer_.add_track("workers (" + run_.executor + ", " + run_.preemption + ")").id;
+    ready_.track = writer_.add_counter("ready jobs", workers_track_);
     for (const ClusterPart &part : parts_of(run_.workload)) {
       if (!part.is_cluster()) continue;
-      for (std::uint32_t w = 0; w < part.workload.platform.workers; ++w) clusters[part.first_worker + w] = part.name;
+      for (std::uint32_t w = 0; w < part.workload.platform.workers; ++w) {
+        worker(part.first_worker + w, " of " + part.name);
+      }
     }
-    for (std::uint32_t w = 0; w < run_.config.workers; ++w) {
-      const auto cluster = clusters.find(w);
-      add_worker(w, cluster == clusters.end() ? "" : " of " + cluster->second);
-    }
+    for (std::uint32_t w = 0; w < run_.config.workers; ++w) worker(w);
   }
 
-  Worker &add_worker(std::uint32_t number, const std::string &more) {
-    const Track track = writer_.add_track("worker " + std::to_string(number) + more, workers_track_);
-    return workers_.emplace(number, Worker{SliceTrack(track), {}, 0}).first->second;
-  }
-
-  Worker &worker(std::uint32_t number) {
+  // Returns the worker. One that the run does not describe gets its track when it is first seen.
+  Worker &worker(std::uint32_t number, const std::string &of_cluster = {}) {
     const auto known = workers_.find(number);
-    return known == workers_.end() ? add_worker(number, "") : known->second;
+    if (known != workers_.end()) return known->second;
+    Track track = writer_.add_track("worker " + std::to_string(number) + of_cluster, workers_track_);
+    return workers_.emplace(number, Worker{track, {}, 0}).first->second;
   }
 
   void add_tasks() {
-    job_ = writer_.argument_name("job");
-    outcome_ = writer_.argument_name("outcome");
-    miss_ = writer_.argument_name("miss");
-    reason_ = writer_.argument_name("reason");
-    slack_ = writer_.argument_name("slack_ns");
-    tasks_.reserve(refs_.size());
     for (const Dag &dag : run_.workload.dags) {
-      const Track parent = writer_.add_track("DAG " + dag.name);
-      DagCounters counters;
-      counters.active = counters_.add(writer_.add_counter("jobs in progress", parent));
-      counters.misses = counters_.add(writer_.add_counter("misses", parent));
-      dags_.push_back(counters);
+      const std::uint64_t parent = writer_.add_track("DAG " + dag.name).id;
+      dags_.push_back({{writer_.add_counter("jobs in progress", parent)}, {writer_.add_counter("misses", parent)}});
+      const std::size_t first = tasks_.size();
       for (const Task &task : dag.tasks) {
-        tasks_.push_back({writer_.event_name(task.name),
-                          writer_.category(dag.name),
-                          Lanes(writer_, task.name, parent),
-                          {},
-                          {},
-                          {},
-                          {}});
+        tasks_.push_back(
+            {.parent = parent, .lanes = {writer_.add_track(task.name, parent)}, .live = {}, .successors = {}});
+      }
+      for (std::size_t t = 0; t < dag.tasks.size(); ++t) {
+        for (const std::uint32_t p : dag.tasks[t].predecessors) {
+          tasks_[first + p].successors.push_back(static_cast<std::uint32_t>(first + t));
+        }
       }
     }
-    for (std::size_t t = 0; t < refs_.size(); ++t) {
-      for (const std::uint32_t p : refs_[t].task->predecessors) {
-        std::vector<std::uint32_t> &successors = tasks_[t - refs_[t].index + p].successors;
-        tasks_[t].place_before.push_back(static_cast<std::uint32_t>(successors.size()));
-        successors.push_back(static_cast<std::uint32_t>(t));
-      }
-    }
-    for (TaskState &task : tasks_) task.data.resize(task.successors.size());
   }
 
   [[nodiscard]] std::string waits_for(std::int64_t device) const {
@@ -228,98 +194,94 @@ class PerfettoWriter::Impl {
   }
 
   void mark(const JobEvent &event, const std::string &name) {
-    const Live *const job = find(event);
-    Lanes &lanes = tasks_[event.task.value].lanes;
-    const std::array arguments = {Argument(job_, std::int64_t{event.job})};
-    writer_.instant(lanes[job == nullptr ? 0 : job->lane].track(), since_start(event.time), writer_.event_name(name),
-                    arguments);
+    const Live *const job = find(event.task, event.job);
+    const Track &lane = tasks_[event.task.value].lanes[job == nullptr ? 0 : job->lane];
+    const Argument number = number_of(event.job);
+    writer_.instant(lane, since_start(event.time), name, {&number, 1});
   }
 
   void release(const JobEvent &event) {
     TaskState &task = tasks_[event.task.value];
+    const std::string &name = refs_[event.task.value].task->name;
+    const Time release = since_start(event.value);
+    const auto free =
+        std::find_if(task.lanes.begin(), task.lanes.end(), [&](const Track &lane) { return lane.is_free_at(release); });
     Live job;
     job.number = event.job;
-    const Time release = since_start(event.value);
-    job.lane = task.lanes.free_lane(release);
-    SliceTrack &lane = task.lanes[job.lane];
-    const std::array arguments = {Argument(job_, std::int64_t{event.job})};
-    writer_.begin(lane.track(), lane.begin(release), task.name, Category::None, {.arguments = arguments});
+    job.lane = static_cast<std::size_t>(free - task.lanes.begin());
+    if (free == task.lanes.end()) task.lanes.push_back(writer_.add_track(name, task.parent));
+    const Argument number = number_of(event.job);
+    writer_.begin(task.lanes[job.lane], release, name, "", {&number, 1});
     task.live.push_back(std::move(job));
   }
 
   void become_ready(const JobEvent &event, Live &job) {
-    if (!std::exchange(job.ready, true)) count(ready_, 1);
-    const TaskState &task = tasks_[event.task.value];
-    const std::size_t first = event.task.value - refs_[event.task.value].index;
-    const std::vector<std::uint32_t> &predecessors = refs_[event.task.value].task->predecessors;
-    for (std::size_t i = 0; i < predecessors.size(); ++i) {
-      std::uint64_t &flow = tasks_[first + predecessors[i]].data[task.place_before[i]];
-      if (flow != 0) job.flows_in.push_back(std::exchange(flow, 0));
+    if (!std::exchange(job.is_ready, true)) count(ready_, 1);
+    const TaskRef &ref = refs_[event.task.value];
+    for (const std::uint32_t p : ref.task->predecessors) {
+      const auto flow = flows_.find({event.task.value - ref.index + p, event.task.value});
+      if (flow == flows_.end()) continue;
+      job.flows.push_back(flow->second);
+      flows_.erase(flow);
     }
   }
 
   void leave_ready(Live &job) {
-    if (std::exchange(job.ready, false)) count(ready_, -1);
+    if (std::exchange(job.is_ready, false)) count(ready_, -1);
   }
 
   void open_slice(const JobEvent &event, Live &job) {
-    const TaskState &task = tasks_[event.task.value];
     Worker &on = worker(event.worker);
-    if (on.slices.is_open()) {  // the event that ends it is missing
-      if (Live *const other = find(on.task, on.number); other != nullptr) close_slice(*other, event.time, {});
+    if (on.track.is_open) {  // the event that ends it is missing
+      if (Live *const other = find(on.task, on.number); other != nullptr) close_slice(*other, event.time);
     }
     on.task = event.task;
     on.number = event.job;
     job.worker = event.worker;
-    const std::array arguments = {Argument(job_, std::int64_t{event.job})};
-    writer_.begin(on.slices.track(), on.slices.begin(since_start(event.time)), task.name, task.category,
-                  {.arguments = arguments, .flows_out = {}, .flows_in = job.flows_in});
-    job.flows_in.clear();
+    const TaskRef &ref = refs_[event.task.value];
+    const Argument number = number_of(event.job);
+    writer_.begin(on.track, since_start(event.time), ref.task->name, run_.workload.dags[ref.dag.value].name,
+                  {&number, 1}, job.flows);
+    job.flows.clear();
   }
 
   // Returns false if the job has no worker.
-  bool close_slice(Live &job, Time at, std::span<const std::uint64_t> flows) {
+  bool close_slice(Live &job, Time at, Flows leaving = {}) {
     if (job.worker == WorkerId::kNoneValue) return false;
-    SliceTrack &slices = worker(std::exchange(job.worker, WorkerId::kNoneValue)).slices;
-    writer_.end(slices.track(), slices.end(since_start(at)), {.arguments = {}, .flows_out = flows, .flows_in = {}});
+    writer_.end(worker(std::exchange(job.worker, WorkerId::kNoneValue)).track, since_start(at), {}, leaving);
     return true;
   }
 
-  // Begins an arrow to each successor of a task, from a job that finished now.
-  const std::vector<std::uint64_t> &begin_flows(TaskState &task) {
-    for (std::uint64_t &flow : task.data) flow = ++flows_;
-    return task.data;
-  }
-
   void finish(const JobEvent &event, const JudgedJob &judged) {
-    Live *const job = find(event);
+    Live *const job = find(event.task, event.job);
     if (job == nullptr) return;
     if (event.kind == JobEventKind::Skipped) mark(event, std::string("skipped: ") + to_string(event.reason));
-    close(*job, event.task, judged.record.finish, event.time, judged);
+    close(*job, event.task, judged.record.finish, judged);
     std::erase_if(tasks_[event.task.value].live, [&](const Live &other) { return other.number == event.job; });
   }
 
-  // Ends all slices of a job at `end`. Its misses count at `now`.
-  void close(Live &job, TaskId id, Time end, Time now, const JudgedJob &judged) {
+  // Ends all slices of a job at `end`. Its misses count now.
+  void close(Live &job, TaskId id, Time end, const JudgedJob &judged) {
     const JobRecord &record = judged.record;
-    last_time_ = std::max(last_time_, now);
-    TaskState &task = tasks_[id.value];
-    SliceTrack &lane = task.lanes[job.lane];
-    std::span<const std::uint64_t> flows;
-    if (record.outcome == JobOutcome::Finished) flows = begin_flows(task);
-    if (close_slice(job, end, flows)) flows = {};
-    if (judged.miss == Miss::Deadline && record.deadline <= end) {
-      const std::array arguments = {Argument(job_, std::int64_t{job.number})};
-      writer_.instant(lane.track(), since_start(record.deadline), writer_.event_name("deadline missed"), arguments);
+    Track &lane = tasks_[id.value].lanes[job.lane];
+    std::vector<std::uint64_t> leaving;
+    std::vector<Argument> arguments = {{"outcome", to_string(record.outcome)}};
+    if (record.outcome == JobOutcome::Finished) {
+      for (const std::uint32_t successor : tasks_[id.value].successors) {
+        leaving.push_back(flows_[{id.value, successor}] = ++last_flow_);
+      }
+      arguments.push_back({"slack_ns", record.deadline - record.finish});
     }
-    std::vector<Argument> &arguments = arguments_;
-    arguments.assign(1, Argument(outcome_, writer_.argument_text(to_string(record.outcome))));
-    if (record.outcome == JobOutcome::Finished) arguments.emplace_back(slack_, record.deadline - record.finish);
-    if (judged.miss != Miss::None) arguments.emplace_back(miss_, writer_.argument_text(to_text(judged.miss)));
-    if (record.reason != Reason::None) arguments.emplace_back(reason_, writer_.argument_text(to_string(record.reason)));
-    writer_.end(lane.track(), lane.end(since_start(end)), {.arguments = arguments, .flows_out = flows, .flows_in = {}});
+    if (close_slice(job, end, leaving)) leaving.clear();
+    if (judged.miss == Miss::Deadline && record.deadline <= end) {
+      const Argument number = number_of(job.number);
+      writer_.instant(lane, since_start(record.deadline), "deadline missed", {&number, 1});
+    }
+    if (judged.miss != Miss::None) arguments.push_back({"miss", to_text(judged.miss)});
+    if (record.reason != Reason::None) arguments.push_back({"reason", to_string(record.reason)});
+    writer_.end(lane, since_start(end), arguments, leaving);
     leave_ready(job);
-    if (job.started) count(dag_of(id).active, -1);
+    if (job.is_started) count(dag_of(id).active, -1);
     if (judged.miss != Miss::None) count(dag_of(id).misses, 1);
   }
 
@@ -327,19 +289,14 @@ class PerfettoWriter::Impl {
   const trace::RunInfo &run_;
   std::vector<TaskRef> refs_;
   DeadlineWatch watch_;
-  Counters counters_;
-  Track workers_track_ = Track::None;
-  std::size_t ready_ = 0;
+  std::uint64_t workers_track_ = 0;
+  Counter ready_;
   std::vector<DagCounters> dags_;
   std::vector<TaskState> tasks_;
   std::unordered_map<std::uint32_t, Worker> workers_;
-  ArgumentName job_ = ArgumentName::None;
-  ArgumentName outcome_ = ArgumentName::None;
-  ArgumentName miss_ = ArgumentName::None;
-  ArgumentName reason_ = ArgumentName::None;
-  ArgumentName slack_ = ArgumentName::None;
-  std::vector<Argument> arguments_;  // reused
-  std::uint64_t flows_ = 0;
+  // The arrow from the last finished job of a task to a successor's next job, by both tasks, until it is drawn.
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint64_t> flows_;
+  std::uint64_t last_flow_ = 0;
   Time last_time_;
 };
 

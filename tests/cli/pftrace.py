@@ -49,15 +49,10 @@ def packets(data):
 
 class Picture:
     def __init__(self, path):
-        texts = {}
         self.tracks = {}
         self.events = []  # (track, type, name, arguments)
         for packet in packets(path.read_bytes()):
             for number, value in packet:
-                if number == 12:
-                    for kind, entry in fields(value):
-                        entry = dict(fields(entry))
-                        texts[kind, entry[1]] = entry[2].decode()
                 if number == 60:
                     its = dict(fields(value))
                     self.tracks[its[1]] = its.get(2, b"").decode()
@@ -67,10 +62,11 @@ class Picture:
                     for field, annotation in fields(value):
                         if field == 4:
                             one = dict(fields(annotation))
-                            name = texts[3, one.pop(1)]
+                            name = one.pop(10).decode()
                             (kind, what), = one.items()
-                            arguments[name] = texts[29, what] if kind == 17 else what.decode() if kind == 6 else what
-                    self.events.append((self.tracks[its[11]], its[9], texts.get((2, its.get(10))), arguments))
+                            arguments[name] = what.decode() if kind == 6 else what
+                    name = its[23].decode() if 23 in its else None
+                    self.events.append((self.tracks[its[11]], its[9], name, arguments))
 
     @property
     def run(self):

@@ -58,80 +58,30 @@ class PictureReader {
 
   void packet(pbf_reader packet) {
     std::uint64_t stamp = 0;
-    std::uint32_t clock = default_clock_;
-    std::uint32_t flags = 0;
     std::uint32_t sequence = 0;
     pbf_reader event;
     bool has_event = false;
     while (packet.next()) {
       switch (packet.tag()) {
-        case 6: clock_snapshot(packet.get_message()); break;
         case 8: stamp = packet.get_uint64(); break;
         case 10: sequence = packet.get_uint32(); break;
         case 11:
           event = packet.get_message();
           has_event = true;
           break;
-        case 12: interned(packet.get_message()); break;
-        case 13: flags = packet.get_uint32(); break;
         case 50: {
           const std::string packets = inflated(packet.get_view());
           picture_.bytes += packets.size();
           read({packets.data(), packets.size()});
           return;
         }
-        case 58: clock = packet.get_uint32(); break;
-        case 59: {
-          pbf_reader defaults = packet.get_message();
-          while (defaults.next(58)) default_clock_ = defaults.get_uint32();
-          break;
-        }
         case 60: track(packet.get_message()); break;
-        case 87: EXPECT_TRUE(packet.get_bool()); break;
         default: ADD_FAILURE() << "packet with field " << packet.tag(); packet.skip();
       }
     }
     ++picture_.packets;
     EXPECT_EQ(sequence, 1U);
-    if (!has_event) return;
-    EXPECT_EQ(flags, 2U) << "it needs the texts before";
-    Time time = static_cast<Time>(stamp);
-    if (clock == delta_clock_) time = last_ += time;
-    track_event(event, time);
-  }
-
-  void clock_snapshot(pbf_reader snapshot) {
-    while (snapshot.next()) {
-      if (snapshot.tag() == 2) {
-        EXPECT_EQ(snapshot.get_uint32(), 6U);  // BOOTTIME
-        continue;
-      }
-      pbf_reader clock = snapshot.get_message();
-      std::uint32_t id = 0;
-      bool is_incremental = false;
-      while (clock.next()) {
-        if (clock.tag() == 1) id = clock.get_uint32();
-        if (clock.tag() == 2) {
-          EXPECT_EQ(clock.get_uint64(), 0U);
-        }
-        if (clock.tag() == 3) is_incremental = clock.get_bool();
-      }
-      if (is_incremental) delta_clock_ = id;
-    }
-  }
-
-  void interned(pbf_reader data) {
-    while (data.next()) {
-      std::map<std::uint64_t, std::string> &texts = texts_[data.tag()];
-      pbf_reader entry = data.get_message();
-      std::uint64_t number = 0;
-      while (entry.next()) {
-        if (entry.tag() == 1) number = entry.get_uint64();
-        if (entry.tag() == 2) {
-          EXPECT_TRUE(texts.emplace(number, entry.get_string()).second);
-        }
-      }
-    }
+    if (has_event) track_event(event, static_cast<Time>(stamp));
   }
 
   void track(pbf_reader descriptor) {
@@ -159,18 +109,13 @@ class PictureReader {
     return its.parent == 0 ? its.name : path_of(its.parent) + "/" + its.name;
   }
 
-  [[nodiscard]] const std::string &text(std::uint32_t kind, std::uint64_t number) const {
-    return texts_.at(kind).at(number);
-  }
-
-  void annotation(pbf_reader its, std::map<std::string, std::string> &arguments) {
+  static void annotation(pbf_reader its, std::map<std::string, std::string> &arguments) {
     std::string name;
     while (its.next()) {
       switch (its.tag()) {
-        case 1: name = text(3, its.get_uint64()); break;
         case 4: arguments[name] = std::to_string(its.get_int64()); break;
         case 6: arguments[name] = its.get_string(); break;
-        case 17: arguments[name] = text(29, its.get_uint64()); break;
+        case 10: name = its.get_string(); break;
         default: ADD_FAILURE() << "argument with field " << its.tag(); its.skip();
       }
     }
@@ -183,11 +128,11 @@ class PictureReader {
     std::int64_t value = 0;
     while (event.next()) {
       switch (event.tag()) {
-        case 3: one.category = text(1, event.get_uint64()); break;
         case 4: annotation(event.get_message(), one.arguments); break;
         case 9: type = event.get_int32(); break;
-        case 10: one.name = text(2, event.get_uint64()); break;
         case 11: one.track_id = event.get_uint64(); break;
+        case 22: one.category = event.get_string(); break;
+        case 23: one.name = event.get_string(); break;
         case 30: value = event.get_int64(); break;
         case 47: one.flows_out.push_back(event.get_fixed64()); break;
         case 48: one.flows_in.push_back(event.get_fixed64()); break;
@@ -220,10 +165,6 @@ class PictureReader {
   std::map<std::uint64_t, Track> tracks_;
   std::set<std::uint64_t> counter_tracks_;
   std::map<std::uint64_t, std::vector<PictureEvent>> open_;
-  std::map<std::uint32_t, std::map<std::uint64_t, std::string>> texts_;  // by field of InternedData
-  std::uint32_t default_clock_ = 6;
-  std::uint32_t delta_clock_ = 0;
-  Time last_ = 0;
 };
 
 }  // namespace

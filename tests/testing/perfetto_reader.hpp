@@ -1,10 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Reads trace.pftrace as trace_processor does: decompresses packets, resolves numbered texts and differences of time,
-// and pairs the ends of slices with their begins. By protozero, with the field numbers of Perfetto's own description of
-// the format, so that a mistake of the writer is not repeated here. Fails the calling test on anything it does not
-// expect.
+// Reads trace.pftrace as trace_processor does: decompresses packets, and pairs the ends of slices with their begins. By
+// protozero, with the field numbers of Perfetto's own description of the format, so that a mistake of the writer is not
+// repeated here. Fails the calling test on anything it does not expect.
 #pragma once
 
 #include <cstdint>
