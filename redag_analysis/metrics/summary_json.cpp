@@ -14,14 +14,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json to_json(const Distribution &distribution) {
-  Json json = {{"count", distribution.count}, {"mean_ns", distribution.mean}, {"min_ns", distribution.min},
-               {"p50_ns", distribution.p50},  {"p90_ns", distribution.p90},   {"p95_ns", distribution.p95},
-               {"p99_ns", distribution.p99},  {"max_ns", distribution.max}};
-  if (distribution.percentile_error > 0) json["percentile_error"] = distribution.percentile_error;
-  return json;
-}
-
 // Lost jobs by reason; reasons that did not occur are omitted.
 Json reasons_to_json(const JobCounts &stats) {
   Json json = Json::object();
@@ -29,24 +21,6 @@ Json reasons_to_json(const JobCounts &stats) {
     if (stats.by_reason[i] > 0) json[to_string(static_cast<Reason>(i))] = stats.by_reason[i];
   }
   return json;
-}
-
-Json to_json(const JobCounts &stats) {
-  return {{"released", stats.released},
-          {"finished", stats.finished},
-          {"skipped", stats.skipped},
-          {"aborted", stats.aborted},
-          {"in_flight", stats.in_flight},
-          {"lost_by_reason", reasons_to_json(stats)},
-          {"deferred", stats.deferred},
-          {"exceeded", stats.exceeded},
-          {"late", stats.late},
-          {"overdue", stats.overdue},
-          {"missed", stats.missed()},
-          {"miss_ratio", stats.miss_ratio()},
-          {"miss_ratio_with_lost", stats.miss_ratio_with_lost()},
-          {"max_lateness_ns", stats.max_lateness ? Json(*stats.max_lateness) : Json(nullptr)},
-          {"preemptions", stats.preemptions}};
 }
 
 Json to_json(const ResponseSplit &split) {
@@ -71,18 +45,6 @@ Json to_json(const TaskSummary &task) {
   return json;
 }
 
-Json to_json(const EndToEnd &end_to_end) {
-  Json sinks = Json::array();
-  for (const SinkSummary &sink : end_to_end.sinks) {
-    sinks.push_back(
-        Json{{"id", sink.task.value}, {"due", sink.due}, {"late", sink.late}, {"response", to_json(sink.response)}});
-  }
-  return Json{{"deadline_ns", end_to_end.deadline},
-              {"late", end_to_end.late},
-              {"response", to_json(end_to_end.response)},
-              {"sinks", std::move(sinks)}};
-}
-
 Json to_json(const DagSummary &dag) {
   Json json = {{"name", dag.name}, {"max_active", dag.max_active}, {"peak_active", dag.peak_active}};
   json.update(to_json(dag.jobs));
@@ -98,6 +60,44 @@ Json rows_to_json(const std::vector<Row> &rows) {
 }
 
 }  // namespace
+
+Json to_json(const Distribution &distribution) {
+  Json json = {{"count", distribution.count}, {"mean_ns", distribution.mean}, {"min_ns", distribution.min},
+               {"p50_ns", distribution.p50},  {"p90_ns", distribution.p90},   {"p95_ns", distribution.p95},
+               {"p99_ns", distribution.p99},  {"max_ns", distribution.max}};
+  if (distribution.percentile_error > 0) json["percentile_error"] = distribution.percentile_error;
+  return json;
+}
+
+Json to_json(const JobCounts &stats) {
+  return {{"released", stats.released},
+          {"finished", stats.finished},
+          {"skipped", stats.skipped},
+          {"aborted", stats.aborted},
+          {"in_flight", stats.in_flight},
+          {"lost_by_reason", reasons_to_json(stats)},
+          {"deferred", stats.deferred},
+          {"exceeded", stats.exceeded},
+          {"late", stats.late},
+          {"overdue", stats.overdue},
+          {"missed", stats.missed()},
+          {"miss_ratio", stats.miss_ratio()},
+          {"miss_ratio_with_lost", stats.miss_ratio_with_lost()},
+          {"max_lateness_ns", stats.max_lateness ? Json(*stats.max_lateness) : Json(nullptr)},
+          {"preemptions", stats.preemptions}};
+}
+
+Json to_json(const EndToEnd &end_to_end) {
+  Json sinks = Json::array();
+  for (const SinkSummary &sink : end_to_end.sinks) {
+    sinks.push_back(
+        Json{{"id", sink.task.value}, {"due", sink.due}, {"late", sink.late}, {"response", to_json(sink.response)}});
+  }
+  return Json{{"deadline_ns", end_to_end.deadline},
+              {"late", end_to_end.late},
+              {"response", to_json(end_to_end.response)},
+              {"sinks", std::move(sinks)}};
+}
 
 std::string summary_to_json(const Summary &summary, const trace::RunInfo &run) {
   Json json = {{"format", "redag.summary/2"}};

@@ -5,6 +5,7 @@
 // docs/results_format.md. Pure except for the file.
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "redag/base/result.hpp"
@@ -12,6 +13,11 @@
 #include "redag_analysis/metrics/summary.hpp"
 
 namespace redag::metrics {
+
+// The parts of the document, for others.
+[[nodiscard]] nlohmann::ordered_json to_json(const Distribution &distribution);
+[[nodiscard]] nlohmann::ordered_json to_json(const JobCounts &jobs);
+[[nodiscard]] nlohmann::ordered_json to_json(const EndToEnd &end_to_end);
 
 /// The text is indented by two and ends with a line break; equal inputs give equal bytes.
 [[nodiscard]] std::string summary_to_json(const Summary &summary, const trace::RunInfo &run);

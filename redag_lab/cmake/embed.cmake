@@ -38,7 +38,7 @@ add_text(kEcharts ${ECHARTS}/echarts.min.js)
 set(frame ${PAGE}/format.js ${PAGE}/elements.js ${PAGE}/sortable.js ${PAGE}/charts.js ${PAGE}/frame.js)
 add_text(kScript ${frame} ${PAGE}/figures.js ${PAGE}/schedule.js ${PAGE}/tables.js
   ${PAGE}/why.js ${PAGE}/page.js)
-add_text(kExperimentScript ${frame} ${PAGE}/experiment.js)
+add_text(kExperimentScript ${frame} ${PAGE}/figures.js ${PAGE}/experiment.js)
 add_text(kLiveTemplate ${PAGE}/live.html)
 add_text(kLiveStyle ${PAGE}/page.css ${PAGE}/live.css)
 add_text(kLiveScript ${frame} ${PAGE}/live_figures.js ${PAGE}/live.js)

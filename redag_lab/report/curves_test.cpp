@@ -13,10 +13,20 @@
 namespace redag::report {
 namespace {
 
-TEST(Curve, OfNothingIsEmpty) { EXPECT_TRUE(curve_of({}).empty()); }
+metrics::DurationSketch sketch_of(const std::vector<Duration> &values, std::size_t exact) {
+  metrics::DurationSketch sketch(exact);
+  for (const Duration value : values) sketch.add(value);
+  return sketch;
+}
+
+std::vector<CurvePoint> curve_of(const std::vector<Duration> &values) {
+  return report::curve_of(sketch_of(values, values.size() + 1));
+}
+
+TEST(Curve, OfNothingIsEmpty) { EXPECT_TRUE(curve_of(std::vector<Duration>()).empty()); }
 
 TEST(Curve, OfFewValuesHasThemAll) {
-  const std::vector<CurvePoint> points = curve_of({3, 5, 5, 9});
+  const std::vector<CurvePoint> points = curve_of(std::vector<Duration>{3, 5, 5, 9});
   EXPECT_EQ(points, (std::vector<CurvePoint>{{3, 1}, {5, 3}, {9, 4}}));
 }
 
@@ -49,42 +59,18 @@ TEST(Curve, OfAMillionValuesIsSmallAndKnowsItsTail) {
   EXPECT_GE(beyond(0.99999), 8);
 }
 
-TEST(Curve, OfASketchIsThatOfItsValues) {
+TEST(Curve, OfASketchHasTheEndsOfItsBuckets) {
   Rng rng(7);
   std::vector<Duration> values(5'000);
-  metrics::DurationSketch exact(values.size());
-  metrics::DurationSketch counted(16);
-  for (Duration &value : values) {
-    value = static_cast<Duration>(rng() % 1'000'000);
-    exact.add(value);
-    counted.add(value);
-  }
+  for (Duration &value : values) value = static_cast<Duration>(rng() % 1'000'000);
+  const std::vector<CurvePoint> points = report::curve_of(sketch_of(values, 16));
   std::sort(values.begin(), values.end());
-  EXPECT_EQ(curve_of(exact), curve_of(values));
-  const std::vector<CurvePoint> points = curve_of(counted);
   EXPECT_EQ(points.front(), (CurvePoint{values.front(), 1}));
   EXPECT_EQ(points.back(), (CurvePoint{values.back(), values.size()}));
   for (const CurvePoint &point : points) {
     const auto at_most = std::upper_bound(values.begin(), values.end(), point.value) - values.begin();
     ASSERT_EQ(point.count, static_cast<std::uint64_t>(at_most)) << point.value;
   }
-}
-
-TEST(Lateness, ClassesAreAnchoredAtReleaseAndDeadline) {
-  constexpr std::size_t kHalf = LatenessHistogram::kClasses / 2;
-  const auto class_of = [](Duration lateness) {
-    LatenessHistogram histogram;
-    histogram.add(lateness, 4000);
-    return static_cast<std::size_t>(std::find(histogram.counts.begin(), histogram.counts.end(), 1U) -
-                                    histogram.counts.begin());
-  };
-  EXPECT_EQ(class_of(-4000), 0U) << "at the release";
-  EXPECT_EQ(class_of(-5000), 0U) << "before it: a clock that was corrected";
-  EXPECT_EQ(class_of(0), kHalf - 1) << "at the deadline is not late";
-  EXPECT_EQ(class_of(1), kHalf) << "a nanosecond beyond is";
-  EXPECT_EQ(class_of(4000), LatenessHistogram::kClasses - 1);
-  EXPECT_EQ(class_of(4001), LatenessHistogram::kClasses) << "more than a deadline late";
-  EXPECT_EQ(class_of(kMaxDuration), LatenessHistogram::kClasses);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include "redag_lab/report/digest.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include "redag/base/check.hpp"
 #include "redag/trace/worker_count.hpp"
@@ -13,12 +14,8 @@
 namespace redag::report {
 namespace {
 
-using metrics::JobOutcome;
+using metrics::DurationSketch;
 using metrics::JobRecord;
-
-double relative_lateness(const JobRecord &job) {
-  return static_cast<double>(job.lateness()) / static_cast<double>(std::max<Duration>(1, job.deadline - job.release));
-}
 
 bool same_tasks(const Workload &a, const Workload &b) {
   const auto same_task = [](const Task &x, const Task &y) { return x.name == y.name; };
@@ -28,131 +25,108 @@ bool same_tasks(const Workload &a, const Workload &b) {
   return std::equal(a.dags.begin(), a.dags.end(), b.dags.begin(), b.dags.end(), same_dag);
 }
 
-}  // namespace
-
-bool Group::fits(const trace::RunInfo &run) const {
-  if (runs_.empty()) return true;
-  return run.executor == info().executor && run.preemption == info().preemption && run.driver == info().driver &&
-         trace::worker_count(run) == trace::worker_count(info()) && same_tasks(run.workload, workload());
+// Returns the misses of a run, and the largest lateness as a share of the deadline.
+std::pair<std::uint64_t, double> badness(const metrics::Summary &summary, const Workload &workload) {
+  std::pair<std::uint64_t, double> worst{summary.total.missed(), -std::numeric_limits<double>::infinity()};
+  for (const metrics::DagSummary &dag : summary.dags) worst.first += dag.end_to_end.late;
+  for (const TaskRef &ref : flatten(workload)) {
+    const std::optional<Duration> &lateness = summary.tasks[ref.id.value].jobs.max_lateness;
+    const auto deadline = static_cast<double>(std::max<Duration>(1, ref.task->deadline));
+    if (lateness) worst.second = std::max(worst.second, static_cast<double>(*lateness) / deadline);
+  }
+  return worst;
 }
 
-Result<void> Group::add(const std::string &path, const trace::Recording &run) {
+}  // namespace
+
+bool GroupReader::fits(const trace::RunInfo &run) const {
+  if (group_.runs.empty()) return true;
+  const trace::RunInfo &first = group_.info();
+  return run.executor == first.executor && run.preemption == first.preemption && run.driver == first.driver &&
+         trace::worker_count(run) == trace::worker_count(first) && same_tasks(run.workload, first.workload);
+}
+
+Result<void> GroupReader::add(const std::string &path, const trace::Recording &run) {
   REDAG_CHECK(fits(run.info()), "jobs of different runs counted together");
-  const bool is_first = runs_.empty();
-  if (is_first) begin(run.info());
-  Timeline timeline;
-  Result<RunDigest> digest = read(path, run, timeline);
+  const bool is_first = group_.runs.empty();
+  if (is_first) {
+    const std::size_t tasks = run.info().workload.task_count();
+    responses_.assign(tasks, DurationSketch(metrics::exact_jobs_of_task(tasks, options_.exact_jobs)));
+    end_to_end_ = responses_;
+    group_.executions.assign(tasks, 0);
+    is_sink_ = metrics::sinks_of(run.info().workload);
+    group_.bounds = bounds_of(run.info());
+  }
+  Result<RunDigest> digest = read(path, run);
   if (!digest) return tl::unexpected<Diagnostics>(std::move(digest.error()));
-  const Result<metrics::Investigation> investigation =
-      metrics::Investigation::of(run, std::nullopt, options_.most_explained);
-  if (!investigation) return tl::unexpected<Diagnostics>(investigation.error());
-  if (is_worst(*investigation)) {
-    const std::vector<metrics::Subject> closest = investigation->closest(1);
-    const std::vector<metrics::Subject> &worst = investigation->misses().empty() ? closest : investigation->misses();
-    Result<Schedule> schedule = schedule_of(run, options_.most_slices, options_.most_views,
-                                            worst.empty() ? std::nullopt : std::optional(worst.front().job));
-    if (!schedule) return tl::unexpected<Diagnostics>(std::move(schedule.error()));
-    Result<WhyDigest> why = why_of(*investigation, *schedule);
-    if (!why) return tl::unexpected<Diagnostics>(std::move(why.error()));
-    worst_run_ = runs_.size();
-    most_missed_ = investigation->misses_in_all();
-    timeline_ = std::move(timeline);
-    schedule_ = *std::move(schedule);
-    why_ = *std::move(why);
+  const auto bad = badness(digest->summary, run.info().workload);
+  if (is_first || bad > worst_) {
+    group_.worst_run = group_.runs.size();
+    worst_ = bad;
+    if (Result<void> explained = explain(run); !explained) return explained;
   }
   const auto bound_of = [this](TaskId task) {
-    return task.value < bounds_.tasks.size() ? bounds_.tasks[task.value].response.value_or(0) : Duration{0};
+    return task.value < group_.bounds.tasks.size() ? group_.bounds.tasks[task.value].response.value_or(0) : Duration{0};
   };
   Result<metrics::AssumptionCheck> check = metrics::check_assumptions(run, bound_of);
   if (!check) return tl::unexpected<Diagnostics>(std::move(check.error()));
   if (is_first) {
-    assumptions_ = *std::move(check);
+    group_.assumptions = *std::move(check);
   } else {
-    assumptions_.add(*check);
+    group_.assumptions.add(*check);
   }
-  runs_.push_back(*std::move(digest));
+  group_.runs.push_back(*std::move(digest));
   return {};
 }
 
-bool Group::is_worst(const metrics::Investigation &investigation) const {
-  if (runs_.empty() || investigation.misses_in_all() > most_missed_) return true;
-  return investigation.misses_in_all() == most_missed_ && latest_ && latest_->run == runs_.size();
-}
-
-void Group::begin(const trace::RunInfo &info) {
-  const std::size_t tasks = info.workload.task_count();
-  is_sink_ = metrics::sinks_of(info.workload);
-  samples_.resize(tasks);
-  responses_.assign(tasks, metrics::DurationSketch(metrics::exact_jobs_of_task(tasks, options_.exact_jobs)));
-  end_to_end_ = responses_;
-  bounds_ = bounds_of(info);
-}
-
 // Counts all that one pass over the events can count.
-Result<RunDigest> Group::read(const std::string &path, const trace::Recording &run, Timeline &timeline) {
+Result<RunDigest> GroupReader::read(const std::string &path, const trace::Recording &run) {
   const trace::RunInfo &info = run.info();
   metrics::Summarizer summarizer(info, options_.exact_jobs);
   metrics::TraceChecker checker(info, metrics::rules_for(info));
   metrics::JobFolder jobs(info.workload);
-  SliceFolder slices(info);
-  ServiceFolder services(info);
-  TimelineBuilder builder(info, options_.most_bins);
-  const auto draw = [&builder](const auto &one) { builder.add(one); };
   const Result<void> visited = run.visit([&](std::span<const JobEvent> events) {
     summarizer.add(events);
     if (info.lost_events == 0) checker.add(events);
     jobs.add(events);
     jobs.drain_ended([&](const JobRecord &job) {
-      take(info, job);
-      builder.add(job);
+      if (job.release >= info.start + info.warm_up) sample(job);
     });
-    slices.add(events);
-    slices.drain(draw);
-    services.add(events);
-    services.drain(draw);
   });
   if (!visited) return tl::unexpected<Diagnostics>(visited.error());
-  for (const JobRecord &job : jobs.in_flight()) builder.add(job);
-  slices.finish();
-  slices.drain(draw);
-  services.finish();
-  services.drain(draw);
-  timeline = builder.take();
   return RunDigest{path, info, summarizer.finish(info.end), checker.finish(info.end, info.lost_events)};
 }
 
-void Group::take(const trace::RunInfo &info, const JobRecord &job) {
-  if (job.release < info.start + info.warm_up || job.outcome != JobOutcome::Finished) return;
-  Samples &samples = samples_[job.task.value];
-  responses_[job.task.value].add(job.response());
-  samples.lateness.add(job.lateness(), std::max<Duration>(1, job.deadline - job.release));
-  samples.execution_max = std::max(samples.execution_max, job.processor == kNever ? job.on_worker : job.processor);
-  if (is_sink_[job.task.value]) end_to_end_[job.task.value].add(job.finish - job.origin);
-  const double lateness = relative_lateness(job);
-  const double most = latest_ ? relative_lateness(latest_->record) : lateness;
-  // Of equal ones the first that was released.
-  const bool is_first_of_equals =
-      latest_ && lateness == most && latest_->run == runs_.size() && job.sequence < latest_->record.sequence;
-  if (!latest_ || lateness > most || is_first_of_equals) {
-    latest_ = LatestJob{job, runs_.size()};
-  }
+Result<void> GroupReader::explain(const trace::Recording &run) {
+  const Result<metrics::Investigation> investigation =
+      metrics::Investigation::of(run, std::nullopt, options_.most_explained);
+  if (!investigation) return tl::unexpected<Diagnostics>(investigation.error());
+  Result<WhyDigest> why = why_of(*investigation, options_.most_views);
+  if (!why) return tl::unexpected<Diagnostics>(std::move(why.error()));
+  group_.why = *std::move(why);
+  Result<Schedule> schedule = schedule_of(run, group_.why.worst_of_dag, options_.most_slices);
+  if (!schedule) return tl::unexpected<Diagnostics>(std::move(schedule.error()));
+  group_.schedule = *std::move(schedule);
+  return {};
 }
 
-metrics::DagSummary Group::pooled(DagId dag) {
-  metrics::DagSummary all;
-  all.name = workload().dags[dag.value].name;
-  all.max_active = workload().dags[dag.value].max_active;
-  all.end_to_end.deadline = workload().dags[dag.value].deadline;
-  for (const RunDigest &run : runs_) {
-    const metrics::DagSummary &one = run.summary.dags[dag.value];
+void GroupReader::sample(const JobRecord &job) {
+  if (job.outcome != metrics::JobOutcome::Finished) return;
+  responses_[job.task.value].add(job.response());
+  Duration &longest = group_.executions[job.task.value];
+  longest = std::max(longest, job.processor == kNever ? job.on_worker : job.processor);
+  if (is_sink_[job.task.value]) end_to_end_[job.task.value].add(job.finish - job.origin);
+}
+
+metrics::DagSummary GroupReader::pooled(DagId dag) const {
+  metrics::DagSummary all = group_.runs.front().summary.dags[dag.value];
+  for (std::size_t r = 1; r < group_.runs.size(); ++r) {
+    const metrics::DagSummary &one = group_.runs[r].summary.dags[dag.value];
     all.jobs.add_counts(one.jobs);
     all.peak_active = std::max(all.peak_active, one.peak_active);
-    std::vector<metrics::SinkSummary> &sinks = all.end_to_end.sinks;
-    sinks.resize(one.end_to_end.sinks.size());
-    for (std::size_t s = 0; s < sinks.size(); ++s) {
-      sinks[s].task = one.end_to_end.sinks[s].task;
-      sinks[s].due += one.end_to_end.sinks[s].due;
-      sinks[s].late += one.end_to_end.sinks[s].late;
+    for (std::size_t s = 0; s < all.end_to_end.sinks.size(); ++s) {
+      all.end_to_end.sinks[s].due += one.end_to_end.sinks[s].due;
+      all.end_to_end.sinks[s].late += one.end_to_end.sinks[s].late;
     }
   }
   for (metrics::SinkSummary &sink : all.end_to_end.sinks) {
@@ -162,22 +136,17 @@ metrics::DagSummary Group::pooled(DagId dag) {
   return all;
 }
 
-void Group::finish() {
-  REDAG_CHECK(!runs_.empty(), "a group without runs");
-  task_stats_.assign(samples_.size(), {});
-  for (std::size_t t = 0; t < samples_.size(); ++t) {
-    for (const RunDigest &run : runs_) {
-      task_stats_[t].add_counts(run.summary.tasks[t].jobs);
-      task_stats_[t].split.add(run.summary.tasks[t].jobs.split);
-    }
-    total_.add_counts(task_stats_[t]);
-    task_stats_[t].response = responses_[t].distribution();
-    samples_[t].responses = curve_of(responses_[t]);
-    samples_[t].is_exact = responses_[t].is_exact();
+Group GroupReader::finish() {
+  REDAG_CHECK(!group_.runs.empty(), "a group without runs");
+  for (std::size_t t = 0; t < responses_.size(); ++t) {
+    metrics::JobStats &task = group_.tasks.emplace_back();
+    for (const RunDigest &run : group_.runs) task.add_counts(run.summary.tasks[t].jobs);
+    group_.total.add_counts(task);
+    task.response = responses_[t].distribution();
+    group_.responses.push_back(curve_of(responses_[t]));
   }
-  for (std::size_t d = 0; d < workload().dags.size(); ++d) dags_.push_back(pooled(DagId(d)));
-  responses_.clear();
-  end_to_end_.clear();
+  for (std::size_t d = 0; d < group_.workload().dags.size(); ++d) group_.dags.push_back(pooled(DagId(d)));
+  return std::move(group_);
 }
 
 }  // namespace redag::report

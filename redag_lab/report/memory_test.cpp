@@ -43,11 +43,11 @@ Measured report_of_run(Duration length) {
   {
     const testing::PeakMemory peak;
     const trace::Recording run = trace::Recording::open(file.string()).value();
-    Group group("long", options);
-    EXPECT_TRUE(group.add("", run));
-    group.finish();
-    measured = {peak.bytes(), group.total().released, group.why().misses};
-    EXPECT_EQ(group.why().explained, options.most_explained);
+    GroupReader reader("long", options);
+    EXPECT_TRUE(reader.add("", run));
+    const Group group = reader.finish();
+    measured = {peak.bytes(), group.total.released, group.why.misses};
+    EXPECT_EQ(group.why.explained, options.most_explained);
   }
   std::filesystem::remove(file);
   return measured;

@@ -23,29 +23,14 @@ std::string script_safe(std::string_view json) {
   return safe;
 }
 
-std::string html_escaped(std::string_view text) {
-  std::string escaped;
-  for (const char c : text) {
-    switch (c) {
-      case '&': escaped += "&amp;"; break;
-      case '<': escaped += "&lt;"; break;
-      case '>': escaped += "&gt;"; break;
-      case '"': escaped += "&quot;"; break;
-      case '\'': escaped += "&#39;"; break;
-      default: escaped += c;
-    }
-  }
-  return escaped;
-}
-
-std::string page(std::string_view document, std::string_view title, PageKind kind) {
+std::string page(std::string_view document, PageKind kind) {
   // The parts are in the order of the template: an inserted text is never searched for placeholders.
-  const std::string safe_title = html_escaped(title);
   const std::string safe_document = script_safe(document);
-  const std::string_view script = kind == PageKind::Runs ? assets::kScript : assets::kExperimentScript;
   const std::pair<std::string_view, std::string_view> parts[] = {
-      {"{{title}}", safe_title},         {"{{style}}", assets::kStyle}, {"{{document}}", safe_document},
-      {"{{echarts}}", assets::kEcharts}, {"{{script}}", script},
+      {"{{style}}", assets::kStyle},
+      {"{{document}}", safe_document},
+      {"{{echarts}}", assets::kEcharts},
+      {"{{script}}", kind == PageKind::Runs ? assets::kScript : assets::kExperimentScript},
   };
   std::string html;
   std::string_view rest = assets::kTemplate;

@@ -13,14 +13,10 @@ namespace redag::report {
 
 enum class PageKind : std::uint8_t { Runs, Experiment };
 
-/// Returns the page. `document` is from to_json() or experiment_document(); `title` is plain text. No text of the
-/// document can become markup.
-[[nodiscard]] std::string page(std::string_view document, std::string_view title, PageKind kind = PageKind::Runs);
+/// Returns the page of a document: to_json() or results.json of an experiment. No text of it can become markup.
+[[nodiscard]] std::string page(std::string_view document, PageKind kind = PageKind::Runs);
 
 /// Returns the JSON for a <script> element, with every "<" escaped. Requires JSON, in which "<" occurs only in strings.
 [[nodiscard]] std::string script_safe(std::string_view json);
-
-/// Escapes a text for HTML, including attribute values in quotes.
-[[nodiscard]] std::string html_escaped(std::string_view text);
 
 }  // namespace redag::report

@@ -32,12 +32,11 @@ trace::Trace simulated(const Workload &workload, Duration length, const std::str
 }
 
 Group group_of(const std::string &label, const std::vector<trace::Trace> &traces, DigestOptions options = {}) {
-  Group group(label, options);
+  GroupReader reader(label, options);
   for (std::size_t i = 0; i < traces.size(); ++i) {
-    EXPECT_TRUE(group.add(fmt::format("{}/repetition-{}", label, i + 1), traces[i]));
+    EXPECT_TRUE(reader.add(fmt::format("{}/repetition-{}", label, i + 1), traces[i]));
   }
-  group.finish();
-  return group;
+  return reader.finish();
 }
 
 std::vector<Group> groups(Group first) {
@@ -106,7 +105,7 @@ TEST(Verdict, WhatWasNoticedIsSaid) {
   EXPECT_EQ(sentences[3].text, "Noticed 1ms after the start, for 2ms: deadlock: a");
   EXPECT_EQ(sentences[4].text, "Noticed 2ms after the start, until the end: deadlock: b");
   trace.info.remarks.resize(8);
-  EXPECT_EQ(verdict_of(group_of("redag", {trace})).back().text, "3 more were noticed.");
+  EXPECT_EQ(verdict_of(group_of("redag", {trace})).back().text, "3 more of this kind.");
 }
 
 TEST(Verdict, MissesAreCountedNamedAndNotProvenAway) {
@@ -174,15 +173,18 @@ TEST(Verdict, RankingTellsOnlyWhatTheRangesTell) {
 TEST(Group, PoolsRepetitionsAndRefusesStrangers) {
   const Workload workload = hi_and_lo(PreemptionMode::Os);
   const trace::Trace one = simulated(workload, kSecond);
-  const Group both = group_of("redag", {one, simulated(workload, kSecond, "redag", 2)});
-  EXPECT_EQ(both.total().released, 240U);
-  EXPECT_EQ(both.task(TaskId(std::size_t{0})).response.count, 200U);
-  EXPECT_EQ(both.task(TaskId(std::size_t{0})).response.max, 2 * kMillisecond);
-  EXPECT_FALSE(both.fits(simulated(workload, kSecond, "mte").info));
-  EXPECT_FALSE(both.fits(simulated(hi_and_lo(PreemptionMode::None), kSecond).info));
+  GroupReader reader("redag", {});
+  ASSERT_TRUE(reader.add("a", one));
+  ASSERT_TRUE(reader.add("b", simulated(workload, kSecond, "redag", 2)));
+  EXPECT_FALSE(reader.fits(simulated(workload, kSecond, "mte").info));
+  EXPECT_FALSE(reader.fits(simulated(hi_and_lo(PreemptionMode::None), kSecond).info));
   Workload renamed = workload;
   renamed.dags[0].tasks[0].name = "other";
-  EXPECT_FALSE(both.fits(simulated(renamed, kSecond).info));
+  EXPECT_FALSE(reader.fits(simulated(renamed, kSecond).info));
+  const Group both = reader.finish();
+  EXPECT_EQ(both.total.released, 240U);
+  EXPECT_EQ(both.tasks[0].response.count, 200U);
+  EXPECT_EQ(both.tasks[0].response.max, 2 * kMillisecond);
 }
 
 // Returns a run of a task released every 10 ms. Job k ends `ends[k]` ms after its release; 0: it is skipped.
@@ -203,8 +205,8 @@ trace::Trace run_of(const std::vector<Time> &ends) {
 TEST(Group, ExplainsTheRunWithMostMisses) {
   const std::vector<trace::Trace> runs = {run_of({1, 19, 1}), run_of({0, 1, 0}), run_of({1, 1, 1}), run_of({0, 0, 1})};
   const Group group = group_of("x", runs);
-  EXPECT_EQ(group.worst_run(), 1U) << "two misses, and the first such run";
-  EXPECT_EQ(group.why().misses, 2U);
+  EXPECT_EQ(group.worst_run, 1U) << "two misses, and the first such run";
+  EXPECT_EQ(group.why.misses, 2U);
   const json document = json::parse(to_json(groups(group_of("x", runs))));
   const json &shown = document["groups"][0];
   EXPECT_EQ(shown["worst_run"], 1);
@@ -212,16 +214,15 @@ TEST(Group, ExplainsTheRunWithMostMisses) {
   EXPECT_EQ(view["job"], 0) << "the worst miss, not the latest of the jobs that finished";
   EXPECT_EQ(view["missed"], true);
   EXPECT_TRUE(view["lateness_ns"].is_null());
-  EXPECT_EQ(shown["why"]["worst"]["number"][0], 0);
-  EXPECT_EQ(shown["timeline"]["missed"][0].front(), 1);
+  EXPECT_EQ(shown["why"]["jobs"][0]["number"], 0);
   EXPECT_EQ(document["cuts"].size(), 0U) << "the page says it where it shows the run";
 }
 
 TEST(Group, WithoutAMissExplainsTheRunThatCameClosest) {
   const Group group = group_of("x", {run_of({1, 1}), run_of({2, 8}), run_of({7, 1})});
-  EXPECT_EQ(group.worst_run(), 1U);
-  ASSERT_FALSE(group.schedule().views.empty());
-  EXPECT_EQ(group.schedule().views.front().job->number, 1U);
+  EXPECT_EQ(group.worst_run, 1U);
+  ASSERT_FALSE(group.schedule.views.empty());
+  EXPECT_EQ(group.schedule.views.front().job->number, 1U);
   EXPECT_NE(verdict_of(group).front().text.find("with 2ms to spare"), std::string::npos);
 }
 
@@ -229,13 +230,14 @@ TEST(Document, SaysWhatTheRunsWere) {
   std::vector<Group> all = groups(group_of("redag", {simulated(hi_and_lo(PreemptionMode::Os), kSecond)}));
   all.push_back(group_of("ste", {simulated(hi_and_lo(PreemptionMode::Os), kSecond, "ste")}));
   const json document = json::parse(to_json(all));
-  EXPECT_EQ(document["format"], "redag.report/2");
+  EXPECT_EQ(document["format"], "redag.report/3");
   EXPECT_EQ(document["title"], "two rates");
   ASSERT_EQ(document["groups"].size(), 2U);
   const json &redag = document["groups"][0];
   EXPECT_EQ(redag["tasks"][0]["bound_ns"], 2'000'000);
   EXPECT_EQ(redag["total"]["released"], 120);
-  EXPECT_EQ(redag["schedule"]["windows"][0]["slices"]["task"].size(), redag["schedule"]["slices_in_all"]);
+  EXPECT_EQ(redag["schedule"]["is_whole"], true);
+  EXPECT_GT(redag["schedule"]["windows"][0]["slices"]["task"].size(), 100U);
   EXPECT_EQ(document["headline"]["text"], "redag missed none of its deadlines and ste 16.7 %");
   EXPECT_EQ(document["comparison"]["dags"].size(), 2U);
   EXPECT_EQ(document["comparison"]["dags"][0]["groups"][0]["missed"], 0);
@@ -296,7 +298,7 @@ TEST(Compare, OneMissIsNeverNone) {
     }
     all.push_back(group_of(label, traces));
   }
-  ASSERT_EQ(all[0].total().released, 23326U);
+  ASSERT_EQ(all[0].total.released, 23326U);
   EXPECT_EQ(compare(all).front().text, "control: redag misses 0.0043 % (1 of 23 326), mte none: no clear difference.");
   EXPECT_EQ(verdict_of(all[0]).front().tone, Tone::Bad);
   EXPECT_EQ(verdict_of(all[1]).front().tone, Tone::Good);
@@ -322,15 +324,14 @@ TEST(Document, OfManyTasksKeepsThoseClosestToAMiss) {
   Workload workload = testing::make_workload({testing::make_dag("wide", tasks)}, 1, PreemptionMode::None);
   DocumentOptions options;
   options.most_tasks = 10;
-  options.most_curves = 5;
   const json document = json::parse(to_json(groups(group_of("redag", {simulated(workload, kSecond)})), options));
   const json &rows = document["groups"][0]["tasks"];
   ASSERT_EQ(rows.size(), 40U) << "positions are TaskIds";
   EXPECT_FALSE(rows[0].contains("jobs"));
   EXPECT_TRUE(rows[39].contains("jobs")) << "the last one to run";
   EXPECT_TRUE(rows[39].contains("responses"));
-  EXPECT_FALSE(rows[31].contains("responses"));
-  EXPECT_EQ(document["cuts"].size(), 2U);
+  EXPECT_FALSE(rows[29].contains("responses"));
+  EXPECT_EQ(document["cuts"].size(), 1U);
 }
 
 TEST(Document, HoldsNamesThatAreNoUtf8) {

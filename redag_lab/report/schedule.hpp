@@ -2,19 +2,16 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The schedule as a picture: which job held which worker, and which device, when. Of a run too long to draw, it keeps
-// the interesting stretches: the job of each DAG closest to its deadline or latest after it, and the beginning. Reads
-// the run up to three times, in memory that does not grow with it.
+// the stretches around given jobs, and the beginning. Reads the run once, in memory that does not grow with it.
 #pragma once
 
-#include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "redag/base/result.hpp"
 #include "redag/trace/recording.hpp"
 #include "redag_analysis/metrics/jobs.hpp"
-#include "redag_analysis/metrics/why_cause.hpp"
-#include "redag_lab/report/services.hpp"
 #include "redag_lab/report/slices.hpp"
 
 namespace redag::report {
@@ -24,7 +21,6 @@ struct Window {
   Time begin = 0;
   Time end = 0;
   std::vector<Slice> slices;             // overlapping the window, in order of their begin
-  std::vector<Service> services;         // the same of devices; each follows a slice
   std::vector<metrics::JobRecord> jobs;  // alive in the window, in order of release
 };
 
@@ -38,15 +34,13 @@ struct View {
 
 struct Schedule {
   std::vector<Window> windows;
-  std::vector<View> views;  // of jobs, the worst first; the last is the beginning of the run
-  std::uint64_t slices_in_all = 0;
-  std::uint64_t slices_shown = 0;  // if less than all, the windows do not cover the run
+  std::vector<View> views;  // of the jobs, as they were given; the last is the beginning of the run
+  bool is_whole = false;    // the run is in one window
 };
 
-/// Makes the schedule. `most` bounds the slices of all windows together, and the jobs to twice as many. The
-/// `most_views` DAGs with the latest jobs, relative to their deadlines, get a view each. `first` gets the first view,
-/// in place of the latest job of its DAG. Error: a damaged file.
-[[nodiscard]] Result<Schedule> schedule_of(const trace::Recording &run, std::size_t most, std::size_t most_views,
-                                           const std::optional<metrics::JobId> &first = std::nullopt);
+/// Makes the schedule with a view of each of the jobs. `most` bounds the slices of all windows together, and the jobs
+/// to twice as many. Error: a damaged file.
+[[nodiscard]] Result<Schedule> schedule_of(const trace::Recording &run, std::span<const metrics::JobRecord> jobs,
+                                           std::size_t most);
 
 }  // namespace redag::report

@@ -16,8 +16,8 @@ namespace {
 
 // Without a miss: how close it was.
 std::string closest(const Group &group) {
-  if (!group.latest()) return {};
-  const metrics::JobRecord &job = group.latest()->record;
+  if (group.why.worst.empty()) return {};
+  const metrics::JobRecord &job = group.why.worst.front().job;
   return fmt::format(" The closest to its deadline was {}, with {} to spare.",
                      trace::task_name(group.workload(), job.task), humanize_duration(-job.lateness()));
 }
@@ -27,9 +27,7 @@ Tone tone_of(const metrics::DeadlineVerdict &verdict) {
   return verdict.is_met ? Tone::Good : Tone::Bad;
 }
 
-metrics::DeadlineVerdict deadlines_of(const Group &group) {
-  return metrics::deadline_verdict(group.total(), group.dags());
-}
+metrics::DeadlineVerdict deadlines_of(const Group &group) { return metrics::deadline_verdict(group.total, group.dags); }
 
 Sentence on_deadlines(const Group &group) {
   const metrics::DeadlineVerdict verdict = deadlines_of(group);
@@ -37,24 +35,23 @@ Sentence on_deadlines(const Group &group) {
 }
 
 Sentence on_bounds(const Group &group) {
-  const RunBounds &bounds = group.bounds();
+  const RunBounds &bounds = group.bounds;
   if (!bounds.absent.empty()) return {Tone::Plain, fmt::format("No bounds to compare with: {}.", bounds.absent)};
   std::vector<std::string> above;
-  const bool simulated = group.info().driver == trace::Driver::Simulator;
   std::size_t bounded = 0;
   bool is_within = true;
   for (std::size_t t = 0; t < bounds.tasks.size(); ++t) {
     if (!bounds.tasks[t].response) continue;
     ++bounded;
-    const Duration longest = group.task(TaskId(t)).response.max;
+    const Duration longest = group.tasks[t].response.max;
     if (longest <= *bounds.tasks[t].response) continue;
     is_within = false;
-    if (!simulated) continue;  // reported with the assumption that broke
+    if (!group.is_simulated()) continue;  // reported with the assumption that broke
     above.push_back(fmt::format("{} ({}, bound {})", trace::task_name(group.workload(), TaskId(t)),
                                 humanize_duration(longest), humanize_duration(*bounds.tasks[t].response)));
   }
   for (std::size_t d = 0; d < bounds.dags.size(); ++d) {
-    const Duration longest = group.end_to_end(DagId(d)).response.max;
+    const Duration longest = group.dags[d].end_to_end.response.max;
     if (!bounds.dags[d].response || longest <= *bounds.dags[d].response) continue;
     is_within = false;
     if (!is_above_bound(group, DagId(d))) continue;
@@ -64,14 +61,15 @@ Sentence on_bounds(const Group &group) {
   if (!above.empty()) {
     return {Tone::Bad,
             fmt::format("Above the bound: {}. {}", join_first(above, 3),
-                        simulated ? "A bound was exceeded in virtual time: either the bound or the simulation is wrong."
-                                  : "An assumption of the bound does not hold.")};
+                        group.is_simulated()
+                            ? "A bound was exceeded in virtual time: either the bound or the simulation is wrong."
+                            : "An assumption of the bound does not hold.")};
   }
   const std::string within = bounded == 0 || !is_within
                                  ? ""
                                  : fmt::format(" Every response time was within its bound ({} of {} have one).",
                                                bounded, plural(bounds.tasks.size(), "task"));
-  if (bounds.schedulable && metrics::has_misses(group.total(), group.dags())) {
+  if (bounds.schedulable && metrics::has_misses(group.total, group.dags)) {
     return {Tone::Caution, fmt::format("Analysis ({}): every deadline is met, by {}, if its assumptions hold. This run "
                                        "missed deadlines, so they did not hold.{}",
                                        bounds.assumes, join_first(bounds.by, 2), within)};
@@ -85,18 +83,22 @@ Sentence on_bounds(const Group &group) {
                       bounds.assumes, within)};
 }
 
+// Adds the first ones as sentences, and says how many more there are.
+void add_bad(const std::vector<std::string> &texts, std::vector<Sentence> &sentences) {
+  constexpr std::size_t kMost = 5;
+  for (std::size_t i = 0; i < std::min(kMost, texts.size()); ++i) sentences.push_back({Tone::Bad, texts[i]});
+  if (texts.size() > kMost)
+    sentences.push_back({Tone::Bad, fmt::format("{} more of this kind.", texts.size() - kMost)});
+}
+
 // Adds each alarm as a sentence, and one sentence for all deviations that the machine's noise may explain.
 void add_assumptions(const Group &group, std::vector<Sentence> &sentences) {
-  constexpr std::size_t kMost = 5;
   std::vector<std::string> alarms;
   std::vector<std::string> notes;
-  for (metrics::Remark &remark : metrics::remarks(group.assumptions(), group.workload())) {
-    (remark.is_alarm ? alarms : notes).push_back(std::move(remark.text));
+  for (metrics::Remark &remark : metrics::remarks(group.assumptions, group.workload())) {
+    remark.is_alarm ? alarms.push_back(remark.text + ".") : notes.push_back(std::move(remark.text));
   }
-  for (std::size_t i = 0; i < std::min(kMost, alarms.size()); ++i) sentences.push_back({Tone::Bad, alarms[i] + "."});
-  if (alarms.size() > kMost) {
-    sentences.push_back({Tone::Bad, plural(alarms.size() - kMost, "other alarm") + " of this kind."});
-  }
+  add_bad(alarms, sentences);
   if (!notes.empty()) {
     sentences.push_back({Tone::Plain, fmt::format("No alarm; the machine's noise may explain these deviations: {}.",
                                                   join_first(notes, 3))});
@@ -105,29 +107,30 @@ void add_assumptions(const Group &group, std::vector<Sentence> &sentences) {
 
 // What observers noticed during the runs.
 void add_noticed(const Group &group, std::vector<Sentence> &sentences) {
-  constexpr std::size_t kMost = 5;
-  std::size_t count = 0;
-  for (const RunDigest &run : group.runs()) {
+  std::vector<std::string> noticed;
+  for (const RunDigest &run : group.runs) {
     for (const trace::Remark &remark : run.info.remarks) {
-      if (++count > kMost) continue;
-      const std::string length =
-          remark.ended == kNever ? "until the end" : "for " + humanize_duration(remark.ended - remark.begun);
-      sentences.push_back(
-          {Tone::Bad, fmt::format("Noticed {} after the start, {}: {}",
-                                  humanize_duration(remark.begun - run.info.start), length, remark.text)});
+      noticed.push_back(fmt::format(
+          "Noticed {} after the start, {}: {}", humanize_duration(remark.begun - run.info.start),
+          remark.ended == kNever ? "until the end" : "for " + humanize_duration(remark.ended - remark.begun),
+          remark.text));
     }
   }
-  if (count > kMost) sentences.push_back({Tone::Bad, fmt::format("{} more were noticed.", count - kMost)});
+  add_bad(noticed, sentences);
+}
+
+Contender contender_of(const Group &group, const metrics::JobCounts &jobs, std::optional<DagId> dag) {
+  return {.name = group.label, .missed = jobs.missed(), .released = jobs.released, .misses = misses_of(group, dag)};
 }
 
 void add_remarks(const Group &group, std::vector<Sentence> &sentences) {
-  if (group.info().driver != trace::Driver::Simulator) add_assumptions(group, sentences);
+  if (!group.is_simulated()) add_assumptions(group, sentences);
   std::uint64_t violations = 0;
   std::uint64_t checks = 0;
   std::uint64_t lost = 0;
   bool enforced = true;
   std::string first;
-  for (const RunDigest &run : group.runs()) {
+  for (const RunDigest &run : group.runs) {
     violations += run.check.violation_count;
     for (const std::uint64_t count : run.check.checks_by_rule) checks += count;
     if (first.empty() && !run.check.violations.empty()) first = run.check.violations.front().to_string();
@@ -162,11 +165,10 @@ const char *to_string(Tone tone) {
 }
 
 bool is_above_bound(const Group &group, DagId dag) {
-  const std::vector<BoundOf> &bounds = group.bounds().dags;
+  const std::vector<BoundOf> &bounds = group.bounds.dags;
   if (dag.value >= bounds.size() || !bounds[dag.value].response) return false;
-  const Duration longest = group.end_to_end(dag).response.max;
-  const bool simulated = group.info().driver == trace::Driver::Simulator;
-  return longest > *bounds[dag.value].response + (simulated ? 0 : group.assumptions().unalarming(longest));
+  const Duration longest = group.dags[dag.value].end_to_end.response.max;
+  return longest > *bounds[dag.value].response + (group.is_simulated() ? 0 : group.assumptions.unalarming(longest));
 }
 
 std::vector<Sentence> verdict_of(const Group &group) {
@@ -218,6 +220,29 @@ std::string comparison_line(const std::string &dag, std::span<const Contender> c
   return line + ": " + (any ? ranking(contenders) : "no deadline missed");
 }
 
+std::vector<CommonDag> common_dags(std::span<const Group> groups) {
+  std::vector<CommonDag> common;
+  if (groups.size() < 2) return common;
+  for (const Dag &dag : groups.front().workload().dags) {
+    CommonDag row{dag.name, {}};
+    for (const Group &group : groups) {
+      const std::vector<Dag> &dags = group.workload().dags;
+      const auto same = std::find_if(dags.begin(), dags.end(), [&](const Dag &d) { return d.name == dag.name; });
+      if (same != dags.end()) row.ids.emplace_back(static_cast<std::size_t>(same - dags.begin()));
+    }
+    if (row.ids.size() == groups.size()) common.push_back(std::move(row));
+  }
+  return common;
+}
+
+Spread misses_of(const Group &group, std::optional<DagId> dag) {
+  std::vector<double> misses;
+  for (const RunDigest &run : group.runs) {
+    misses.push_back((dag ? run.summary.dags[dag->value].jobs : run.summary.total).miss_ratio_with_lost());
+  }
+  return spread_of(std::move(misses));
+}
+
 Sentence headline_of(std::span<const Group> groups) {
   REDAG_CHECK(!groups.empty(), "a headline of nothing");
   if (groups.size() == 1) {
@@ -226,19 +251,17 @@ Sentence headline_of(std::span<const Group> groups) {
   }
   std::vector<Contender> contenders;
   std::vector<std::string> shares;
-  bool any = false;
   for (const Group &group : groups) {
-    std::vector<double> misses;
-    for (const RunDigest &run : group.runs()) misses.push_back(run.summary.total.miss_ratio_with_lost());
-    const metrics::JobCounts &total = group.total();
-    contenders.push_back(
-        {.name = group.label(), .missed = total.missed(), .released = total.released, .misses = spread_of(misses)});
+    const metrics::JobCounts &total = group.total;
+    contenders.push_back(contender_of(group, total, std::nullopt));
     const std::string share = total.missed() == 0 ? "none" : format_percent(total.miss_ratio_with_lost());
-    shares.push_back(shares.empty() ? fmt::format("{} missed {} of its deadlines", group.label(), share)
-                                    : fmt::format("{} {}", group.label(), share));
-    any = any || total.missed() > 0;
+    shares.push_back(shares.empty() ? fmt::format("{} missed {} of its deadlines", group.label, share)
+                                    : fmt::format("{} {}", group.label, share));
   }
-  if (!any) return {Tone::Good, "No job missed its deadline under any executor"};
+  const auto missed = [](const Contender &contender) { return contender.missed > 0; };
+  if (std::none_of(contenders.begin(), contenders.end(), missed)) {
+    return {Tone::Good, "No job missed its deadline under any executor"};
+  }
   const std::string order = ranking(contenders);
   const bool is_plain = order.ends_with(" misses fewest");  // the shares say so
   return {Tone::Plain, join(shares) + (is_plain ? "" : ": " + order)};
@@ -246,24 +269,11 @@ Sentence headline_of(std::span<const Group> groups) {
 
 std::vector<Sentence> compare(std::span<const Group> groups) {
   std::vector<Sentence> sentences;
-  if (groups.size() < 2) return sentences;
-  for (const Dag &dag : groups.front().workload().dags) {
+  for (const CommonDag &dag : common_dags(groups)) {
     std::vector<Contender> contenders;
-    for (const Group &group : groups) {
-      const std::vector<Dag> &dags = group.workload().dags;
-      const auto same = std::find_if(dags.begin(), dags.end(), [&](const Dag &d) { return d.name == dag.name; });
-      if (same == dags.end()) break;
-      const DagId id(static_cast<std::size_t>(same - dags.begin()));
-      std::vector<double> misses;
-      for (const RunDigest &run : group.runs()) {
-        misses.push_back(run.summary.dags[id.value].jobs.miss_ratio_with_lost());
-      }
-      contenders.push_back({.name = group.label(),
-                            .missed = group.dag(id).missed(),
-                            .released = group.dag(id).released,
-                            .misses = spread_of(misses)});
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      contenders.push_back(contender_of(groups[g], groups[g].dags[dag.ids[g].value].jobs, dag.ids[g]));
     }
-    if (contenders.size() < groups.size()) continue;
     sentences.push_back({Tone::Plain, comparison_line(dag.name, contenders) + "."});
   }
   return sentences;

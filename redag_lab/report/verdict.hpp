@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -44,6 +45,18 @@ struct Spread {
 /// Requires at least one value.
 [[nodiscard]] Spread spread_of(std::vector<double> values);
 
+/// Returns the share of missed jobs over the repetitions; of all DAGs together without `dag`.
+[[nodiscard]] Spread misses_of(const Group &group, std::optional<DagId> dag);
+
+/// A DAG that all groups have.
+struct CommonDag {
+  std::string name;
+  std::vector<DagId> ids;  // by group
+};
+
+/// None for a single group.
+[[nodiscard]] std::vector<CommonDag> common_dags(std::span<const Group> groups);
+
 struct Contender {
   std::string name;
   std::uint64_t missed = 0;  // in all repetitions
@@ -59,7 +72,7 @@ struct Contender {
 /// repetitions together.
 [[nodiscard]] std::string comparison_line(const std::string &dag, std::span<const Contender> contenders);
 
-/// Returns a sentence for each DAG that all groups have; none for a single group.
+/// Returns a sentence for each common DAG.
 [[nodiscard]] std::vector<Sentence> compare(std::span<const Group> groups);
 
 }  // namespace redag::report

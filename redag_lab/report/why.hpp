@@ -6,37 +6,27 @@
 #pragma once
 
 #include <cstddef>
-#include <optional>
-#include <string>
+#include <nlohmann/json_fwd.hpp>
 #include <vector>
 
 #include "redag/base/result.hpp"
 #include "redag_analysis/metrics/why.hpp"
-#include "redag_lab/report/schedule.hpp"
 
 namespace redag::report {
-
-/// A row of the list of the worst jobs.
-struct WorstJob {
-  metrics::JobRecord job;
-  Time since = 0;                              // its release, from the start of the run
-  std::optional<Duration> lateness;            // of the deadline that it missed most; empty: it was lost
-  std::optional<metrics::Culprit> main_cause;  // empty: it was lost at its release
-};
 
 struct WhyDigest {
   std::uint64_t misses = 0;   // jobs that missed any deadline
   std::uint64_t missed = 0;   // of these, the late and lost ones; the others missed only the DAG's deadline
   std::size_t explained = 0;  // misses that the causes cover
   std::vector<metrics::Culprit> causes;
-  std::vector<WorstJob> worst;             // all misses up to a limit, the worst first; without a miss the closest jobs
-  std::vector<metrics::Explanation> jobs;  // the worst misses, and those that the schedule shows
+  std::vector<metrics::Explanation> worst;       // the worst misses; without one the jobs that came closest
+  std::vector<metrics::JobRecord> worst_of_dag;  // the worst job of each DAG, the worst first
 };
 
-/// Explains the misses of a run. Without a miss, the jobs are those that came closest to one. Error: a damaged file.
-[[nodiscard]] Result<WhyDigest> why_of(const metrics::Investigation &investigation, const Schedule &schedule);
+/// Explains the misses of a run, and finds the worst jobs of at most `most_dags` DAGs. Error: a damaged file.
+[[nodiscard]] Result<WhyDigest> why_of(const metrics::Investigation &investigation, std::size_t most_dags);
 
-/// Returns the object `why` of a group (docs/results_format.md) as JSON.
-[[nodiscard]] std::string to_json(const WhyDigest &why, const trace::RunInfo &run);
+/// Returns the object `why` of a group (docs/results_format.md).
+[[nodiscard]] nlohmann::ordered_json to_json(const WhyDigest &why, const trace::RunInfo &run);
 
 }  // namespace redag::report

@@ -124,7 +124,7 @@ class Acceptance(Experiments):
         self.run_plan(self.plan(), "done")
         result = self.expect(redag("report", self.folder / "done"), 0)
         self.assertIn("acceptance: 32 of 32 workloads", result.stdout)
-        self.assertIn("<title>acceptance - ReDAG-RT report</title>", (self.folder / "done" / "report.html").read_text())
+        self.assertIn("\"name\":\"acceptance\"", (self.folder / "done" / "report.html").read_text())
         document = self.document(redag("report", self.folder / "done", "--json"), "redag.experiment/1")
         self.assertEqual((document["done"], len(document["rows"])), (32, 2 * 4 * 3))
 
@@ -220,7 +220,7 @@ class Factorial(Experiments):
         self.run_plan(self.plan(), "done")
         result = self.expect(redag("report", self.folder / "done"), 0)
         self.assertIn("small: 52 of 52 runs", result.stdout)
-        self.assertIn("<title>small - ReDAG-RT report</title>", (self.folder / "done" / "report.html").read_text())
+        self.assertIn("\"name\":\"small\"", (self.folder / "done" / "report.html").read_text())
         self.expect(redag("report", self.folder / "done", self.folder / "done"), 2, "name this folder alone")
         (self.folder / "done" / "results.json").write_text("{}")
         self.expect(redag("report", self.folder / "done"), 2, "results.json: is not a redag.experiment/1")

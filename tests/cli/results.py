@@ -312,7 +312,7 @@ class Report(Case):
         self.results("out")
 
     def test_data(self):
-        document = self.document(redag("report", self.results("out"), "--json"), "redag.report/2")
+        document = self.document(redag("report", self.results("out"), "--json"), "redag.report/3")
         group = document["groups"][0]
         self.assertEqual(group["label"], "redag")
         summary = json.loads((self.folder / "out" / "summary.json").read_text())
@@ -335,14 +335,14 @@ class Report(Case):
         out = self.folder / "cmp"
         self.expect(redag("compare", self.cart, "--simulate", "--executors", "ste,redag", "--repeat", "2", "--duration", "1s",
                           "--out", out), 0)
-        document = self.document(redag("report", out, "--json"), "redag.report/2")
+        document = self.document(redag("report", out, "--json"), "redag.report/3")
         self.assertEqual([group["label"] for group in document["groups"]], ["ste", "redag"], "as they were listed")
         self.assertEqual([len(group["runs"]) for group in document["groups"]], [2, 2])
         self.assertEqual([row["name"] for row in document["comparison"]["dags"]], ["fast", "slow"])
 
     def test_folders_are_told_apart_by_name(self):
         first, second = self.results("before/redag"), self.results("after/redag", "--executor", "mte")
-        document = self.document(redag("report", first, second, first, "--json"), "redag.report/2")
+        document = self.document(redag("report", first, second, first, "--json"), "redag.report/3")
         self.assertEqual([group["label"] for group in document["groups"]], ["before/redag", "after/redag"])
 
     def test_mistakes(self):

@@ -117,11 +117,11 @@ void events_target(std::string_view input) {
   REDAG_CHECK(metrics::write_jobs_csv(folder + "/jobs.csv", trace->info.workload, jobs).has_value(), "jobs.csv");
   REDAG_CHECK(metrics::write_perfetto(folder + "/trace.pftrace", *trace).has_value(), "trace.pftrace");
   std::vector<report::Group> groups;
-  groups.emplace_back("fuzz", report::digest_options(1));
-  REDAG_CHECK(groups.back().add(folder, *trace).has_value(), "a trace in memory can be read");
-  if (groups.back().fits(trace->info)) REDAG_CHECK(groups.back().add(folder, *trace).has_value(), "and again");
-  groups.back().finish();
-  (void)report::page(report::to_json(groups), report::title_of(groups));
+  report::GroupReader reader("fuzz", report::digest_options(1));
+  REDAG_CHECK(reader.add(folder, *trace).has_value(), "a trace in memory can be read");
+  if (reader.fits(trace->info)) REDAG_CHECK(reader.add(folder, *trace).has_value(), "and again");
+  groups.push_back(reader.finish());
+  (void)report::page(report::to_json(groups));
   (void)report::verdict_of(groups.front());
   const std::string path = folder + "/events.redag";
   REDAG_CHECK(trace::write_trace(path, *trace).has_value(), "events.redag");

@@ -58,7 +58,10 @@ async function open(options = {}) {
   return {page, problems, close: () => context.close()};
 }
 const none = (problems) => assert.deepEqual(problems, []);
-const names = (page) => page.locator('.live-table tbody th').allInnerTexts();
+const TASKS = '[data-table="DAGs and tasks"]';
+const names = (page) => page.locator(`${TASKS} tbody th`).allInnerTexts();
+/** Waits until the table has more rows than this. */
+const rowsOf = (page, count) => page.waitForFunction(([table, least]) => document.querySelectorAll(`${table} tbody tr`).length > least, [TASKS, count]);
 
 await test('without a token there is no page', async () => {
   const context = await browser.newContext();
@@ -80,15 +83,15 @@ const robot = await start(path.join(source, 'workloads', 'robot.yaml'));
 await test('an executor is shown, and the token leaves the address', async () => {
   const {page, problems, close} = await open();
   assert.equal(page.url(), `${origin}/`);
-  await page.waitForFunction(() => document.querySelectorAll('.live-table tbody tr').length > 5);
+  await rowsOf(page, 5);
   assert.equal(await page.locator('h1').innerText(), 'robot');
   assert.match(await page.locator('.facts').innerText(), new RegExp(`redag ${robot.pid}`));
   assert.equal(await page.locator('.state').innerText(), 'running');
   // Figures change, and the rows stay the same elements.
-  await page.evaluate(() => { window.firstRow = document.querySelector('.live-table tbody tr'); });
+  await page.evaluate((table) => { window.firstRow = document.querySelector(`${table} tbody tr`); }, TASKS);
   const before = await page.locator('#headline').innerText();
   await page.waitForFunction((old) => document.querySelector('#headline').innerText !== old, before);
-  assert.ok(await page.evaluate(() => window.firstRow === document.querySelector('.live-table tbody tr')));
+  assert.ok(await page.evaluate((table) => window.firstRow === document.querySelector(`${table} tbody tr`), TASKS));
   await page.waitForFunction(() => document.querySelectorAll('.spread rect').length > 10 && document.querySelectorAll('.worker').length > 0
     && document.querySelectorAll('figure[data-figure=course] svg path').length > 5);
   await page.waitForTimeout(6000);
@@ -111,7 +114,7 @@ await test('contrast: axe-core finds nothing, and marks can be seen, in light an
     const {page, problems, close} = await open({colorScheme});
     await page.waitForFunction(() => document.querySelectorAll('.spread rect.in-time').length > 5);
     await page.getByRole('button', {name: 'p99', exact: true}).click();
-    for (const [selector, property] of [['.spread rect.in-time', 'fill'], ['.spread line', 'stroke'], ['th[aria-sort] button', 'color'], ['.bar > div', 'backgroundColor']]) {
+    for (const [selector, property] of [['.spread rect.in-time', 'fill'], ['.spread line', 'stroke'], ['th[aria-sort=descending] button', 'color'], ['.bar > div', 'backgroundColor']]) {
       const found = await contrast(page, selector, property);
       assert.ok(found >= 3, `${colorScheme}: ${selector} has a contrast of ${found.toFixed(2)}`);
     }
@@ -149,7 +152,7 @@ await test('phone: nothing is wider than the screen', async () => {
 
 await test('controls: filter, order, DAGs only, since the start', async () => {
   const {page, problems, close} = await open();
-  await page.waitForFunction(() => document.querySelectorAll('.live-table tbody tr').length > 5);
+  await rowsOf(page, 5);
   const all = await names(page);
   await page.getByRole('searchbox').fill('CONTROLLER');
   assert.deepEqual((await names(page)).map((name) => name.toLowerCase()).filter((name) => name.includes('controller')).length, 1);
@@ -158,13 +161,15 @@ await test('controls: filter, order, DAGs only, since the start', async () => {
   assert.deepEqual(await names(page), []);
   await page.getByRole('searchbox').fill('');
   await page.getByRole('button', {name: 'p99', exact: true}).click();
-  assert.equal(await page.locator('th[aria-sort]').innerText(), 'p99');
-  assert.ok((await names(page)).every((name) => name.includes('.')), 'tasks only, with the names of their DAGs');
-  await page.getByRole('button', {name: 'only DAGs'}).click();
+  assert.equal(await page.locator('th[aria-sort=descending]').innerText(), 'p99');
+  assert.notDeepEqual(await names(page), all);
+  await page.getByRole('button', {name: 'p99', exact: true}).dblclick();
+  assert.deepEqual(await names(page), all, 'the third time gives the order as listed');
+  await page.getByRole('button', {name: 'tasks', exact: true}).click();
+  assert.ok((await names(page)).every((name) => name.includes('.')));
+  await page.getByRole('button', {name: 'DAGs', exact: true}).click();
   assert.ok((await names(page)).every((name) => !name.includes('.')));
-  await page.getByRole('button', {name: 'only DAGs'}).click();
-  await page.getByRole('button', {name: 'DAG and task'}).click();
-  assert.deepEqual(await names(page), all);
+  await page.getByRole('button', {name: 'all', exact: true}).click();
   await page.getByRole('button', {name: 'since the start'}).click();
   assert.equal(await page.getByRole('button', {name: 'since the start'}).getAttribute('aria-pressed'), 'true');
   none(problems);
@@ -177,7 +182,7 @@ async function withDevices(options, body) {
   const {page, problems, close} = await open(options);
   await page.waitForFunction(() => document.querySelectorAll('select option').length === 2);
   await page.getByLabel('executor', {exact: true}).selectOption(String(perception.pid));
-  await page.waitForFunction(() => /[1-9]/.test(document.querySelector('.device-table .share')?.innerText ?? ''));
+  await page.waitForFunction(() => /[1-9]/.test(document.querySelector('[data-table=Devices] .load span')?.innerText ?? ''));
   await body(page);
   none(problems);
   await close();
@@ -186,13 +191,13 @@ async function withDevices(options, body) {
 }
 
 await test('devices have rows of their own', () => withDevices({}, async (page) => {
-  assert.deepEqual(await page.locator('.device-table tbody th').allInnerTexts(), ['gpu']);
-  assert.match(await page.locator('.device-table tbody td').nth(1).innerText(), /^[01]\/1$/);
+  assert.deepEqual(await page.locator('[data-table=Devices] tbody th').allInnerTexts(), ['gpu']);
+  assert.match(await page.locator('[data-table=Devices] tbody td').nth(1).innerText(), /^[01]\/1$/);
   // Some job waits at some time, and the device then serves or is asked.
-  await page.waitForFunction(() => /camera|lidar|map/.test(document.querySelector('.device-table tbody td:last-child').innerText));
-  const column = (await page.locator('.live-table thead th').allInnerTexts()).indexOf('away');
+  await page.waitForFunction(() => /camera|lidar|map/.test(document.querySelector('[data-table=Devices] tbody td:last-child').innerText));
+  const column = (await page.locator(`${TASKS} thead th`).allInnerTexts()).indexOf('away');
   assert.ok(column > 0);
-  await page.waitForFunction((i) => [...document.querySelectorAll('.live-table tr.dag')].some((row) => row.children[i].innerText === '1'), column);
+  await page.waitForFunction(([table, i]) => [...document.querySelectorAll(`${table} tr.group`)].some((row) => row.children[i].innerText === '1'), [TASKS, column]);
   await page.screenshot({path: shot('live-devices'), fullPage: true});
 }));
 
@@ -209,7 +214,7 @@ await test('several: one is chosen; names are text; one that is killed is said t
   await page.waitForFunction(() => document.querySelectorAll('select option').length === 2);
   await picker.selectOption(String(hostile.pid));
   await page.waitForFunction((pid) => document.querySelector('.facts').innerText.includes(`redag ${pid}`), hostile.pid);
-  await page.waitForFunction(() => document.querySelectorAll('.live-table tbody tr').length > 0);
+  await rowsOf(page, 0);
   assert.equal(await page.locator('main img, main script, main iframe').count(), 0);
   await page.screenshot({path: shot('live-hostile'), fullPage: true});
   await hostile.kill();

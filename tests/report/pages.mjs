@@ -7,9 +7,9 @@ import path from 'node:path';
 import {pathToFileURL} from 'node:url';
 import {chromium} from 'playwright-core';
 
-export const FIGURES = {comparison: ['missed', 'p99', 'responses', 'lateness', 'timeline', 'schedule']};
-FIGURES.experiment = ['curves', 'distance', 'bounds'];
-FIGURES.worlds = ['curves', 'distance', 'worlds'];
+export const FIGURES = {comparison: ['missed', 'p99', 'responses', 'schedule']};
+FIGURES.experiment = ['curves'];
+FIGURES.worlds = ['curves', 'worlds'];
 FIGURES.executors = ['worlds'];
 FIGURES.acceptance = ['curves'];
 FIGURES.single = FIGURES.perception = FIGURES.hostile = FIGURES.long = FIGURES.wide = FIGURES.comparison.slice(2);

@@ -73,7 +73,7 @@ class Reporting {
     const std::size_t count = found.traces();
     std::size_t done = 0;
     for (const RecordedRuns &runs : found.runs) {
-      report::Group group(runs.label, sizes);
+      report::GroupReader group(runs.label, sizes);
       bool any = false;
       for (const std::string &file : runs.traces) {
         if (InterruptGuard::interrupted()) break;
@@ -102,11 +102,10 @@ class Reporting {
         ++done;
       }
       if (!any) continue;
-      group.finish();
-      groups_.push_back(std::move(group));
+      groups_.push_back(group.finish());
     }
     // A single group is labelled by its executor instead of its path.
-    if (groups_.size() == 1) groups_.front().set_label(groups_.front().info().executor);
+    if (groups_.size() == 1) groups_.front().label = groups_.front().info().executor;
     if (done < count) {
       notes_.push_back(fmt::format("interrupted: only {} of {} runs were read", done, count));
       console_.warn(notes_.back());
@@ -124,7 +123,7 @@ class Reporting {
       if (options_.output.empty()) return kExitOk;
     }
     const std::string path = output();
-    const std::string html = report::page(document, report::title_of(groups_));
+    const std::string html = report::page(document);
     const Result<void> written = write_text(path, html);
     if (!written) {
       console_.note(written.error());
@@ -132,7 +131,7 @@ class Reporting {
     }
     std::string text;
     for (const report::Group &group : groups_) {
-      text += (groups_.size() > 1 ? group.label() + ": " : "") + report::verdict_of(group).front().text + "\n";
+      text += (groups_.size() > 1 ? group.label + ": " : "") + report::verdict_of(group).front().text + "\n";
     }
     text += page_text(path, html);
     if (options_.json) {
@@ -175,7 +174,7 @@ int report_experiment(const ReportArguments &options, const std::string &file, C
     if (options.output.empty()) return kExitOk;
   }
   const std::string name = document.value("name", "");
-  const std::string html = report::page(*text, name, report::PageKind::Experiment);
+  const std::string html = report::page(*text, report::PageKind::Experiment);
   const std::string path =
       options.output.empty() ? (fs::path(file).parent_path() / "report.html").string() : options.output;
   if (const Result<void> written = write_text(path, html); !written) {

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // ECharts on this page: one theme, light or dark. Each chart is redrawn when theme, width or data change, and can be
-// saved as PNG and SVG. Its data can be read as a table.
+// saved as SVG.
 
 // What a colour means, here and in page.css. Nothing is told by colour alone: marks, names, dashes and patterns say the
 // same. No hue is near the red of misses, the green of what is met, or the orange of lost time, and all differ for
@@ -17,9 +17,7 @@ const PATTERNS = ['none', 'lines', 'dots'];
 
 const charts = [];
 const themed = [];   // functions to call when the theme changes
-let beforePrint = null;  // the state before printing, while printing
 let forced = null;  // 'light' or 'dark' if the reader or the printer chose it
-const isPrinting = () => beforePrint !== null;
 
 const systemDark = window.matchMedia('(prefers-color-scheme: dark)');
 const themeName = () => forced || (systemDark.matches ? 'dark' : 'light');
@@ -56,46 +54,14 @@ const swatch = ({color, pattern = 'none'}) => element(`span.swatch.${pattern}`, 
 /** Returns a name in its look. Long names break after a dot, a line or a slash. */
 const named = (look, name) => element('span.named', {}, swatch(look), ...breakable(name));
 
-/** Returns the list of what colours and lines mean. `hue` and `shade` name what they tell apart; null: nothing. */
-function colourKey(hue, shade) {
-  const mark = (kind) => element(`span.mark.${kind}`, {'aria-hidden': 'true'});
-  const many = (looks) => element('span', {}, ...looks.slice(0, 3).map(swatch));
-  const t = theme();
-  const rows = [
-    [mark('missed'), 'missed: late or lost, or a rule that was broken'], [mark('met'), 'met: no deadline missed, no rule broken'],
-    [mark('delay'), 'time in which a job did not execute'],
-    [mark('deadline'), 'dashed line: deadline'], [mark('bound'), 'dotted line: bound that the analysis proves'],
-    hue && [many(t.hues.map((_, i) => hueOf(t, i))), `hue: ${hue}`, t.hues], shade && [many(t.shades.map((_, i) => shadeOf(t, i))), `shade and pattern: ${shade}`, t.shades],
-  ];
-  return element('ul.key', {}, ...rows.filter(Boolean).map(([sign, text, looks]) => element('li', {'data-looks': looks && looks.join(' ')}, sign, text)));
-}
-
 function applyTheme() {
   document.documentElement.dataset.theme = themeName();
   themed.forEach((make) => make());
   charts.forEach((chart) => chart.draw());
 }
 
-const BUTTONS_WIDTH = 210;
+const BUTTONS_WIDTH = 180;
 const NARROW = 560;  // where the buttons are above the figure (page.css)
-const legendWidth = (width) => Math.max(120, width - (isPrinting() || width < NARROW ? 8 : BUTTONS_WIDTH));
-
-/** Returns the height that a printed legend needs beyond its first line. */
-function legendHeight(option, width) {
-  if (!option.legend || !isPrinting()) return 0;
-  const names = [...new Set(option.series.map(({name}) => name).filter(Boolean))];
-  let lines = 1;
-  let at = 0;
-  for (const name of names) {
-    const wide = 34 + 6.6 * Math.min(42, name.length);
-    if (at > 0 && at + wide > legendWidth(width)) {
-      lines += 1;
-      at = 0;
-    }
-    at += wide;
-  }
-  return 19 * (lines - 1);
-}
 
 // Adds the page's text, axes and tooltips to an option. The figure's own values take precedence.
 function withTheme(option, t, width) {
@@ -116,9 +82,8 @@ function withTheme(option, t, width) {
     xAxis: axes(option.xAxis),
     yAxis: axes(option.yAxis),
     legend: option.legend && {
-      // The legend ends before the buttons. Paper has no buttons, and no pages of a legend. ECharts uses only one of left
-      // and right beside the width.
-      type: isPrinting() ? 'plain' : 'scroll', top: 0, left: 0, width: legendWidth(width), icon: 'roundRect', itemWidth: 14, itemHeight: 10,
+      // The legend ends before the buttons. ECharts uses only one of left and right beside the width.
+      type: 'scroll', top: 0, left: 0, width: Math.max(120, width - (width < NARROW ? 8 : BUTTONS_WIDTH)), icon: 'roundRect', itemWidth: 14, itemHeight: 10,
       formatter: (name) => (name.length > 42 ? `${name.slice(0, 41)}\u2026` : name), textStyle: {color: t.ink},
       pageTextStyle: {color: t.soft}, pageIconColor: t.ink, inactiveColor: t.line, ...option.legend,
     },
@@ -137,60 +102,32 @@ function download(name, blob) {
   setTimeout(() => URL.revokeObjectURL(url), 60000);  // a busy browser starts to read the URL late
 }
 
-// Returns a picture of `option` as a Blob.
-function pictureOf(option, kind, width, height) {
-  const plain = {...option, animation: false};
-  if (kind === 'svg') {
-    const drawing = echarts.init(null, null, {renderer: 'svg', ssr: true, width, height});
-    drawing.setOption(plain);
-    const text = drawing.renderToSVGString();
-    drawing.dispose();
-    return new Blob([text], {type: 'image/svg+xml'});
-  }
-  const place = element('div', {style: `width:${width}px;height:${height}px`});
-  const drawing = echarts.init(place, null, {renderer: 'canvas', width, height, devicePixelRatio: 3});
-  drawing.setOption(plain);
-  const url = drawing.getDataURL({type: 'png', pixelRatio: 3, backgroundColor: option.backgroundColor});
-  drawing.dispose();
-  // Browsers limit the length of data URLs that they save.
-  const bytes = atob(url.slice(url.indexOf(',') + 1));
-  return new Blob([Uint8Array.from(bytes, (byte) => byte.charCodeAt(0))], {type: 'image/png'});
-}
-
 /**
  * Returns a figure. `build(t, width)` returns an ECharts option for theme `t`, or a sentence if there is nothing to
- * draw. `data()` returns what it shows as {columns, rows} of a table. `canvas` draws pixels instead of SVG, for many
- * shapes. `onready(chart)` is called with every new chart. A figure with a dataZoom gets buttons for it.
+ * draw. `canvas` draws pixels instead of SVG, for many shapes. `onready(chart)` is called with every new chart. `zooms`:
+ * buttons for its dataZoom.
  */
-function figure({name, height, build, data, caption, canvas = false, label, onready, zooms = false}) {
+function figure({name, height, build, caption, canvas = false, label, onready, zooms = false}) {
   const place = element('div', {style: `height:${height}px`, role: 'img', 'aria-label': label});
-  const values = element('details.data', {ontoggle: () => fillData()}, element('summary', {}, 'Data of this figure'), element('div'));
-  const box = element('figure', {'data-figure': name}, element('div.chart', {}, place), element('figcaption', {}, caption), data ? values : null);
+  const nothing = element('p.soft');
+  const box = element('figure', {'data-figure': name}, element('div.chart', {}, place, nothing), element('figcaption', {}, caption));
   // The wheel belongs to the page. ECharts would take it for every figure that can zoom, even where it does nothing.
   for (const wheel of ['wheel', 'mousewheel']) {
     place.addEventListener(wheel, (event) => { if (!event.ctrlKey) event.stopPropagation(); }, {capture: true, passive: true});
   }
   let chart = null;
-  let drawn = null;  // the option drawn
-  let nothing = null;
 
-  function fillData() {
-    if (!data || !values.open) return;
-    const {columns, rows} = data();
-    values.lastElementChild.replaceChildren(table(`${label}: data`, columns, rows));
-  }
-  function save(kind) {
-    const now = chart.getOption();  // includes the reader's zoom and legend selection
-    const option = {...drawn, backgroundColor: theme().paper};
-    if (drawn.dataZoom) option.dataZoom = now.dataZoom;
-    if (drawn.legend) option.legend = {...drawn.legend, selected: now.legend[0].selected};
-    download(`redag-${name}.${kind}`, pictureOf(option, kind, place.clientWidth, height));
+  function save() {
+    const drawing = echarts.init(null, null, {renderer: 'svg', ssr: true, width: place.clientWidth, height});
+    drawing.setOption({...chart.getOption(), backgroundColor: theme().paper});  // with the reader's zoom and legend
+    download(`redag-${name}.svg`, new Blob([drawing.renderToSVGString()], {type: 'image/svg+xml'}));
+    drawing.dispose();
   }
   const tool = (text, what, act) => element('button', {type: 'button', title: what, 'aria-label': `${name}: ${what}`, onclick: () => { if (chart) act(); }}, text);
   box.prepend(element('span.tools.controls', {role: 'group', 'aria-label': `${label}: tools`},
     ...(zooms ? [tool('\u2190', 'earlier', () => self.zoom(1, -0.5)), tool('\u2192', 'later', () => self.zoom(1, 0.5)),
       tool('+', 'zoom in', () => self.zoom(2, 0)), tool('\u2212', 'zoom out', () => self.zoom(0.5, 0))] : []),
-    ...['png', 'svg'].map((kind) => tool(kind.toUpperCase(), `save as ${kind.toUpperCase()}`, () => save(kind)))));
+    tool('SVG', 'save as SVG', save)));
 
   const self = {
     box,
@@ -207,28 +144,17 @@ function figure({name, height, build, data, caption, canvas = false, label, onre
       chart.dispatchAction({type: 'dataZoom', start: begin, end: begin + length});
     },
     draw() {
-      fillData();
-      const width = place.clientWidth;
-      if (width === 0) return;
+      if (box.clientWidth === 0) return;
       const t = theme();
-      const option = build(t, width);
+      const option = build(t, box.clientWidth);
       if (chart !== null) chart.dispose();
       chart = null;
-      if (nothing !== null) nothing.remove();
-      nothing = null;
-      place.style.display = '';
-      if (typeof option === 'string') {
-        nothing = element('p.soft', {}, option);
-        place.after(nothing);
-        place.style.display = 'none';
-        return;
-      }
-      const extra = legendHeight(option, width);
-      place.style.height = `${height + extra}px`;
-      if (extra > 0) option.grid = [].concat(option.grid).map((grid) => ({...grid, top: grid.top + extra}));
+      const isEmpty = typeof option === 'string';
+      nothing.textContent = isEmpty ? option : '';
+      place.style.display = isEmpty ? 'none' : '';
+      if (isEmpty) return;
       chart = echarts.init(place, null, {renderer: canvas ? 'canvas' : 'svg', devicePixelRatio: Math.max(2, window.devicePixelRatio)});
-      drawn = withTheme(option, t, width);
-      chart.setOption(drawn);
+      chart.setOption(withTheme(option, t, box.clientWidth));
       if (onready) onready(chart);
     },
   };
@@ -244,17 +170,12 @@ window.addEventListener('resize', () => {
 });
 systemDark.addEventListener('change', applyTheme);
 // Paper is white, and narrower than most windows.
-window.addEventListener('beforeprint', () => {
-  beforePrint = {forced};
-  forced = 'light';
-  document.getElementById('report').style.width = '700px';
+let beforePrint = null;  // the theme that the reader chose
+function print(isPaper) {
+  if (isPaper) beforePrint = forced;
+  forced = isPaper ? 'light' : beforePrint;
+  document.getElementById('report').style.width = isPaper ? '700px' : '';
   applyTheme();
-  refillTables();
-});
-window.addEventListener('afterprint', () => {
-  ({forced} = beforePrint);
-  beforePrint = null;
-  document.getElementById('report').style.width = '';
-  applyTheme();
-  refillTables();
-});
+}
+window.addEventListener('beforeprint', () => print(true));
+window.addEventListener('afterprint', () => print(false));

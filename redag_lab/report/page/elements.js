@@ -24,6 +24,17 @@ function svgElement(tag, attributes, ...children) {
   return node;
 }
 
+/** Makes the children of a node look like fresh ones. Equal ones stay, with focus, selection and scrolling. */
+function patch(node, fresh) {
+  fresh.forEach((wanted, i) => {
+    const old = node.children[i];
+    if (old === undefined) node.append(wanted);
+    else if (old.tagName === 'TR' && old.cloneNode().isEqualNode(wanted.cloneNode())) patch(old, [...wanted.children]);
+    else if (!old.isEqualNode(wanted)) old.replaceWith(wanted);
+  });
+  while (node.children.length > fresh.length) node.lastElementChild.remove();
+}
+
 /** Returns a named row of buttons, one of which is pressed. A press on another one calls `choose(index)`. */
 function choice(label, names, chosen, choose) {
   const buttons = names.map((name, i) => element('button', {type: 'button', 'aria-pressed': String(i === chosen), onclick: () => {

@@ -81,15 +81,7 @@ const ENDS = {
   preempted: 'preempted here',
   open: 'continues',
   waits: 'waits from here',
-};
-const STAYS = {
-  not_ready: 'not ready',
-  ready: 'ready',
-  on_worker: 'on a worker',
-  preempted: 'preempted',
-  device_queue: 'queue of a device',
-  device: 'at a device',
-  waits: 'other waits',
+  served: 'woken here',
 };
 const TONES = {
   good: '\u2713',

@@ -44,44 +44,26 @@ function provenanceRows(provenance) {
     ['Calibration', calibration]];
 }
 
+/** Returns a description list of [name, value]. */
+const factList = (rows) => element('dl', {}, ...rows.flatMap(([name, value]) => [element('dt', {}, name), element('dd', {}, value)]));
+
 function pageFooter({version, provenance}) {
   const made = provenance ? [`Page made ${provenance.created} by ${programOf(provenance)} on ${provenance.host}: `, element('code', {}, provenance.command), '. ']
     : [`Page made by redag ${version}. `];
   return element('footer', {}, ...made, `Figures: Apache ECharts ${echarts.version} (Apache License 2.0). `
-    + 'This file uses no network. Each figure can be saved as PNG or SVG with the buttons above it.');
+    + 'This file uses no network. A button above each figure saves it as SVG.');
 }
 
-/** Returns links to all headings; the one of the section in view is current. */
+/** Returns links to all headings. */
 function contents() {
-  const headings = [...document.querySelectorAll('main h2[id], main h3[id]')];
-  const links = headings.map((node) => element('a', {href: `#${node.id}`}, node.dataset.contents || node.textContent));
-  const nav = element('nav.contents.controls', {'aria-label': 'Contents'}, element('ol', {},
-    ...links.map((link, i) => element(headings[i].tagName === 'H3' ? 'li.sub' : 'li', {}, link))));
-  let current = null;
-  let waiting = false;
-  function look() {
-    waiting = false;
-    const above = headings.filter((node) => node.getBoundingClientRect().top < 150);
-    // At the end of the page the last sections cannot reach the top.
-    const atEnd = window.scrollY > 0 && window.innerHeight + window.scrollY >= document.documentElement.scrollHeight - 2;
-    const link = links[atEnd ? links.length - 1 : Math.max(0, above.length - 1)];
-    if (link === current) return;
-    if (current !== null) current.removeAttribute('aria-current');
-    link.setAttribute('aria-current', 'location');
-    current = link;
-    const bar = nav.firstElementChild;
-    bar.scrollLeft = link.offsetLeft - bar.clientWidth / 3;  // where the contents are a bar, the section stays in view
-  }
-  window.addEventListener('scroll', () => {
-    if (!waiting) window.requestAnimationFrame(look);
-    waiting = true;
-  }, {passive: true});
-  look();
-  return nav;
+  const links = [...document.querySelectorAll('main h2[id], main h3[id]')].map((node) => element(node.tagName === 'H3' ? 'li.sub' : 'li', {},
+    element('a', {href: `#${node.id}`}, node.dataset.contents || node.textContent)));
+  return element('nav.contents.controls', {'aria-label': 'Contents'}, element('ol', {}, ...links));
 }
 
 /** Shows the page's nodes, without null ones, and draws its figures. */
-function startPage(nodes) {
+function startPage(title, nodes) {
+  document.title = `${title} - ReDAG-RT report`;
   document.documentElement.dataset.theme = themeName();
   themed.push(refill);
   const main = document.getElementById('report');

@@ -3,7 +3,7 @@
 
 // The page of `redag serve`: which executor is watched, and what is said about it. The server sends a state each second.
 
-const view = {filter: '', column: null, dagsOnly: false, whole: false};
+const view = {filter: '', rows: 'all', whole: false};
 const live = {source: null, chosen: null, frame: null, list: [], gone: false, lost: false};
 
 const idOf = ({pid, number}) => (number === 0 ? String(pid) : `${pid}.${number}`);
@@ -14,23 +14,20 @@ const title = element('h1', {}, 'redag live');
 const badge = element('span.state', {role: 'status'});
 const facts = element('p.facts');
 const misses = element('p', {id: 'headline'});
-const alarm = element('p.bad-text', {role: 'alert'});
+const alarm = element('p.missed', {role: 'alert'});
 const picker = element('select', {'aria-label': 'executor', onchange: () => choose(picker.value)});
 const pick = element('label', {}, 'executor', picker);
-const bars = workerBars();
-const devices = deviceTable();
+const workers = element('div.workers');
+const devices = table('Devices', DEVICE_COLUMNS, []);
+const deviceSection = element('div', {}, element('h2', {id: 'devices'}, 'Devices'), devices);
 const course = courseFigure();
-const rows = liveTable(view, () => show());
+const rows = table('DAGs and tasks', LIVE_COLUMNS, [], {most: 200});  // a browser is slow with more
 const content = element('div');
 
-/** Returns a button that stays pressed. */
-function toggle(text, help, key) {
-  const button = element('button', {type: 'button', title: help, 'aria-pressed': 'false', onclick: () => {
-    view[key] = !view[key];
-    button.setAttribute('aria-pressed', String(view[key]));
-    show();
-  }}, text);
-  return button;
+/** Sets the text and the class of a node if they change: screen readers say what is new. */
+function say(node, text, kind) {
+  if (node.textContent !== text) node.textContent = text;
+  if (kind !== undefined) node.className = kind;
 }
 
 /** Returns what is wrong with the executor, or with the connection to it; '' if nothing. */
@@ -49,31 +46,32 @@ function show() {
   pick.hidden = list.every((executor) => frame !== null && idOf(executor) === idOf(frame));  // nothing else to watch
   if (!frame) {
     content.hidden = true;
-    setText(facts, live.lost ? 'The connection to redag serve is lost. The page tries again.'
+    say(facts, live.lost ? 'The connection to redag serve is lost. The page tries again.'
       : list.length > 0 ? 'The live page of this executor cannot be read.'
         : 'No running executor publishes a live page. The page waits for one.');
     return;
   }
   content.hidden = false;
-  setText(title, frame.name);
+  say(title, frame.name);
   document.title = `${frame.name} \u2013 redag live`;
   const problem = trouble();
-  setText(badge, problem || 'running');
-  setClass(badge, problem ? 'state trouble' : 'state running');
-  setText(facts, [`${frame.program} ${idOf(frame)}`, frame.driver, `${frame.workers} worker${frame.workers === 1 ? '' : 's'}`, `preemption ${frame.preemption}`,
+  say(badge, problem || 'running', problem ? 'state trouble' : 'state running');
+  say(facts, [`${frame.program} ${idOf(frame)}`, frame.driver, `${frame.workers} worker${frame.workers === 1 ? '' : 's'}`, `preemption ${frame.preemption}`,
     frame.policy, `up ${inWords(frame.up_ns)}`, `live page ${formatPercent(frame.page_cpu_ns / frame.up_ns)} of a processor`].join(' \u00b7 '));
   const total = frame.dags.reduce((sum, dag) => ({jobs: sum.jobs + dag.released, finished: sum.finished + dag.finished, rate: sum.rate + dag.rate, missed: sum.missed + dag.misses, lately: sum.lately + dag.recent.misses}),
     {jobs: 0, finished: 0, rate: 0, missed: 0, lately: 0});
   const jobs = `${formatCount(total.jobs)} job${total.jobs === 1 ? '' : 's'}`;
   const verdict = total.missed === 0 ? `No deadline missed, of ${jobs}`
     : `${formatCount(total.missed)} of ${jobs} missed their deadline, ${formatCount(total.lately)} in the last ${inWords(frame.window_ns)}`;
-  setText(misses, `${verdict} \u2013 ${formatCount(total.finished)} finished, ${Number(total.rate.toPrecision(4))}/s${frame.on_misses ? ` \u2013 ${frame.on_misses}` : ''}`);
-  setClass(misses, total.lately > 0 ? 'bad-text' : total.missed > 0 ? 'near-text' : 'good-text');
-  setText(alarm, [frame.alert, problem.startsWith('no update') ? 'The process is stopped, or gets no processor.' : null,
-    frame.left_out > 0 ? `${formatCount(frame.left_out)} more tasks do not fit the live page.` : null].filter(Boolean).join(' '));
-  bars.update(frame);
-  devices.update(frame);
-  rows.update(frame);
+  say(misses, `${verdict} \u2013 ${formatCount(total.finished)} finished, ${Number(total.rate.toPrecision(4))}/s${frame.on_misses ? ` \u2013 ${frame.on_misses}` : ''}`,
+    total.lately > 0 ? 'missed' : total.missed > 0 ? 'delay' : 'met');
+  say(alarm, [frame.alert, problem.startsWith('no update') ? 'The process is stopped, or gets no processor.' : null,
+    frame.left_out > 0 ? `${formatCount(frame.left_out)} more tasks do not fit the live page.` : null,
+    frame.devices_in_all > frame.devices.length ? `${formatCount(frame.devices_in_all - frame.devices.length)} more devices do not fit the live page.` : null].filter(Boolean).join(' '));
+  patch(workers, workerBars(frame));
+  deviceSection.hidden = frame.devices.length === 0;
+  devices.update(deviceRows(frame));
+  rows.update(liveRows(frame, view));
 }
 
 function receive({data}) {
@@ -110,9 +108,11 @@ function choose(executor) {
 }
 
 const filter = element('input', {type: 'search', placeholder: 'filter names', 'aria-label': 'filter names', oninput: () => { view.filter = filter.value; if (live.frame) show(); }});
-content.append(misses, alarm, bars.node, devices.node, element('h2', {id: 'table'}, 'DAGs and tasks'),
-  element('div.row.controls', {}, filter, toggle('since the start', 'Response times of the whole run, instead of the last seconds', 'whole'), toggle('only DAGs', 'Without their tasks', 'dagsOnly')),
-  rows.node, element('h2', {id: 'course'}, 'Response times lately'), course.box);
+const ROWS = ['all', 'DAGs', 'tasks'];
+content.append(misses, alarm, workers, deviceSection, element('h2', {id: 'table'}, 'DAGs and tasks'),
+  element('div.row.controls', {}, filter, choice('Response times', ['of the last seconds', 'since the start'], 0, (i) => { view.whole = i === 1; show(); }),
+    choice('Rows', ROWS, 0, (i) => { view.rows = ROWS[i]; show(); })),
+  rows, element('h2', {id: 'course'}, 'Response times lately'), course.box);
 content.hidden = true;
 document.documentElement.dataset.theme = themeName();
 document.getElementById('report').append(

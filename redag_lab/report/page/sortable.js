@@ -1,22 +1,20 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Tables that a reader can sort, by click or key. Long ones show their first rows until the reader asks for all; paper
-// shows more. On a phone a row becomes a card (page.css). The roles are explicit, because cards are no table to browsers.
+// Tables that a reader can sort, by click or key. Long ones show their first rows until the reader asks for all. On a
+// phone a row becomes a card (page.css). The roles are explicit, because cards are no table to browsers.
 
 const MOST_ROWS_AT_ONCE = 40;
-const MOST_ROWS_PRINTED = 400;
 const orders = new Map();  // caption -> what the reader chose, kept when the table is made again
 
-const column = (title, help, text = false) => ({title, help, text});
+/** `kind`: "text" is on the left, "minor" is not shown on a phone. */
+const column = (title, help, kind = '') => ({title, help, kind});
 
 // A cell's content is a string, a node, or {text, kind, title, sort}.
-const isPlain = (content) => content === null || content === undefined || typeof content !== 'object' || content instanceof Node;
-const contentOf = (content) => (isPlain(content) ? {text: content} : content);
+const contentOf = (content) => (content === null || typeof content !== 'object' || content instanceof Node ? {text: content} : content);
 function sortKey(content) {
   const {text, sort} = contentOf(content);
-  if (sort !== undefined) return sort;
-  return text instanceof Node ? text.textContent : text;
+  return sort !== undefined ? sort : text instanceof Node ? text.textContent : text;
 }
 
 // Rows without a value come last, in either direction.
@@ -35,60 +33,52 @@ function rowOf(columns, row, isSorted) {
   const cells = row.cells.map((content, i) => {
     const {text, kind = '', title} = contentOf(content);
     const tag = i === 0 ? 'th' : 'td';
-    const classes = [tag, kind, columns[i].text ? 'text' : ''].filter((part) => part !== '').join('.');
-    return element(classes, {
+    return element([tag, kind, columns[i].kind].filter(Boolean).join('.'), {
       title, 'data-label': columns[i].title, role: i === 0 ? 'rowheader' : 'cell', scope: i === 0 ? 'row' : null,
     }, text);
   });
-  const first = row.first && !isSorted;
-  return element(first ? 'tr.group' : 'tr', {role: 'row', 'aria-current': row.current ? 'true' : null}, ...cells);
+  return element(row.first && !isSorted ? 'tr.group' : 'tr', {role: 'row', 'aria-current': row.current ? 'true' : null}, ...cells);
 }
 
 /**
  * Returns a table. `caption` names it, and is the only one of this name on the page. A row is {cells, first, current};
- * its first cell is the row's head. `total` counts all rows, if not all are here.
+ * its first cell is the row's head. `total` counts all rows, if not all are here. update(rows) replaces them.
  */
-function table(caption, columns, rows, {sortable = true, most = MOST_ROWS_AT_ONCE, total = rows.length} = {}) {
-  if (!orders.has(caption)) orders.set(caption, {at: null, down: false, all: false});
+function table(caption, columns, rows, {most = MOST_ROWS_AT_ONCE, total = 0} = {}) {
+  if (!orders.has(caption)) orders.set(caption, {at: null, down: false, clicks: 0, all: false});
   const order = orders.get(caption);
   const body = element('tbody', {role: 'rowgroup'});
   const more = element('div');
-  const heads = columns.map(({title, help, text}, i) => element(text ? 'th.text' : 'th', {scope: 'col', role: 'columnheader', title: sortable ? null : help},
-    sortable && title !== '' ? element('button.sort', {type: 'button', title: help, onclick: () => sortBy(i)}, title) : title));
-  const choices = element('div.row.cards-only.controls', {}, dropdown('sort by', ['as listed', ...columns.map(({title}) => title)], order.at === null ? 0 : order.at + 1,
-    (i) => sortBy(i === 0 ? null : i - 1)));
+  const heads = columns.map(({title, help, kind}, i) => element(['th', kind].filter(Boolean).join('.'), {scope: 'col', role: 'columnheader'},
+    element('button.sort', {type: 'button', title: help, onclick: () => sortBy(i)}, title)));
+  const frame = element('div.table', {tabindex: '0', role: 'region', 'aria-label': caption}, element('table', {role: 'table', 'aria-label': caption},
+    element('thead', {role: 'rowgroup'}, element('tr', {role: 'row'}, ...heads)), body));
+  const box = element('div', {'data-table': caption}, frame, more);
 
+  // Numbers begin with the largest one, names with the first. The third click gives the order as listed.
   function sortBy(at) {
-    // Numbers begin with the largest one, names with the first.
-    const isNumber = at !== null && rows.some(({cells}) => typeof sortKey(cells[at]) === 'number');
-    order.down = order.at === at ? !order.down : isNumber;
-    order.at = at;
+    const isNumber = rows.some(({cells}) => typeof sortKey(cells[at]) === 'number');
+    order.clicks = order.at === at ? order.clicks + 1 : 0;
+    order.at = order.clicks === 2 ? null : at;
+    order.down = isNumber === (order.clicks === 0);
     refill();
   }
   function refill() {
-    heads.forEach((head, i) => {
-      if (!sortable) return;
-      head.setAttribute('aria-sort', order.at !== i ? 'none' : order.down ? 'descending' : 'ascending');
-    });
-    const limit = isPrinting() ? MOST_ROWS_PRINTED : order.all ? Infinity : most;
-    const shown = inOrder(rows, order).slice(0, limit);
-    body.replaceChildren(...shown.map((row) => rowOf(columns, row, order.at !== null)));
-    const left = total - shown.length;
+    heads.forEach((head, i) => head.setAttribute('aria-sort', order.at !== i ? 'none' : order.down ? 'descending' : 'ascending'));
+    const shown = inOrder(rows, order).slice(0, order.all ? Infinity : most);
+    patch(body, shown.map((row) => rowOf(columns, row, order.at !== null)));
+    const left = Math.max(total, rows.length) - shown.length;
     more.replaceChildren(...(left === 0 ? [] : [element('p.row.soft', {}, `${formatCount(shown.length)} rows; ${formatCount(left)} more.`,
       shown.length === rows.length ? null : element('button.controls', {type: 'button', onclick: () => {
         order.all = true;
         refill();
         frame.focus();
-      }},
-        `show ${rows.length === total ? 'all' : 'the worst'} ${formatCount(rows.length)}`))]));
+      }}, `show ${total > rows.length ? 'the worst' : 'all'} ${formatCount(rows.length)}`))]));
   }
-  const frame = element('div.table', {tabindex: '0', role: 'region', 'aria-label': caption}, element('table', {role: 'table', 'aria-label': caption},
-    element('thead', {role: 'rowgroup'}, element('tr', {role: 'row'}, ...heads)), body));
-  const box = element('div', {'data-table': caption}, sortable && rows.length > 1 ? choices : null, frame, more);
-  box.refill = refill;
+  box.update = (fresh) => {
+    rows = fresh;
+    refill();
+  };
   refill();
   return box;
 }
-
-/** Makes the rows of all tables again: more fit on paper. */
-const refillTables = () => document.querySelectorAll('[data-table]').forEach((box) => box.refill());

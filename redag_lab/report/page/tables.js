@@ -1,7 +1,10 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Draws the tables: by DAG, by task, executors side by side, and the runs.
+// Draws the tables: by DAG, by task, and executors side by side.
+
+/** Returns a distribution, or null if it is of nothing. */
+const known = (response) => (response.count > 0 ? response : null);
 
 function missCell(jobs) {
   const lost = Object.entries(jobs.lost_by_reason).map(([reason, count]) => `${formatCount(count)} ${REASONS[reason]}`);
@@ -42,22 +45,21 @@ function taskTable(group) {
   const columns = [
     column('task'), column('period'), column('deadline'), column('jobs', 'Released jobs'), column('missed', 'Late, skipped or aborted jobs, of all released jobs'),
     column('p50', 'Median response time: finish \u2212 release'), column('p99'), column('max'), column('bound', 'Tightest sound bound on the response time'),
-    column('meter', meterHelp, true), column('max lateness', 'Largest finish \u2212 deadline; negative: the least time to spare'),
+    column('meter', meterHelp, 'text'), column('max lateness', 'Largest finish \u2212 deadline; negative: the least time to spare'),
     column('executed / wcet', 'Largest processor time of a job, and the stated worst-case execution time'), column('preempted', 'Number of preemptions'),
   ];
   // Of many tasks, those closest to a miss come first.
-  const closeness = ({jobs, deadline_ns: deadline}) => [jobs.miss_ratio, jobs.max_lateness_ns === null ? -1 : jobs.max_lateness_ns / deadline];
+  const closeness = ({jobs, deadline_ns: deadline}) => 1e6 * jobs.miss_ratio_with_lost + (jobs.max_lateness_ns ?? -deadline) / deadline;
   const tasks = group.tasks.filter((task) => task.jobs !== undefined);
-  if (tasks.length > MOST_ROWS_AT_ONCE) tasks.sort((a, b) => closeness(b)[0] - closeness(a)[0] || closeness(b)[1] - closeness(a)[1]);
+  if (tasks.length > MOST_ROWS_AT_ONCE) tasks.sort((a, b) => closeness(b) - closeness(a));
   let dag = -1;
   const rows = tasks.map((task) => {
     const first = task.dag !== dag;
     dag = task.dag;
-    const r = task.jobs.response;
-    const name = `${group.dags[task.dag].name}.${task.name}`;
+    const r = known(task.jobs.response);
     const look = hueOf(t, task.dag);
     return {first, cells: [
-      {text: named(look, name)}, timeCell(task.period_ns), timeCell(task.deadline_ns), countCell(task.jobs.released),
+      {text: named(look, `${group.dags[task.dag].name}.${task.name}`)}, timeCell(task.period_ns), timeCell(task.deadline_ns), countCell(task.jobs.released),
       missCell(task.jobs), ...percentileCells(r, 'p50', 'p99'), timeCell(r && r.max_ns, {kind: lateKind(r && r.max_ns > task.deadline_ns)}),
       boundCell(task.bound_ns, r ? r.max_ns : 0, task.method, task.bound_alarm),
       {text: meter(t, r, task.deadline_ns, task.bound_ns, look.color), sort: r ? r.max_ns / task.deadline_ns : null},
@@ -70,61 +72,6 @@ function taskTable(group) {
   return table('Tasks', columns, rows);
 }
 
-const STAY_HELP = {
-  not_ready: 'Its release was not seen yet, or a predecessor was incomplete',
-  ready: 'Could start or go on, but for a worker; before it has started also for max_active, its group, or an earlier job of its task',
-  on_worker: 'Had a worker',
-  preempted: 'Lost its worker to another job',
-  device_queue: 'Had asked a device, which served others',
-  device: 'Was served by a device',
-  waits: 'Waited without a worker for something else: an event, a time, or in a call that blocks',
-};
-
-/** Returns a bar of the parts of a response, by stay. Work has the hue of the DAG; orange is time that others cost it. */
-function splitBar(t, lengths, colour) {
-  const looks = {not_ready: [t.line, 1], ready: [t.delay, 1], on_worker: [colour, 1], preempted: [t.delay, 0.7], device_queue: [t.delay, 0.45],
-    device: [colour, 0.55], waits: [t.soft, 0.5]};
-  const sum = Math.max(1, lengths.reduce((a, b) => a + b, 0));
-  let at = 0;
-  const parts = Object.keys(STAYS).map((stay, i) => {
-    const x = 100 * at / sum;
-    at += lengths[i];
-    const [fill, opacity] = looks[stay];
-    return svgElement('rect', {x: x.toFixed(3), y: 2, width: (100 * lengths[i] / sum).toFixed(3), height: 12, fill, opacity},
-      svgElement('title', {}, `${STAYS[stay]}: ${formatPercent(lengths[i] / sum)}`));
-  });
-  return svgElement('svg', {class: 'meter split', viewBox: '0 0 100 16', preserveAspectRatio: 'none', role: 'img', 'aria-label': 'The parts beside it as shares'}, ...parts);
-}
-
-/** Returns where the response times of each task go: of all its jobs, or of the one with the longest response. */
-function splitTable(group, longest) {
-  const t = theme();
-  const tasks = group.tasks.filter((task) => task.jobs !== undefined && task.jobs.response);
-  const lengthsOf = ({jobs}) => (longest ? jobs.split.longest_ns : jobs.split.total_ns.map((ns) => ns / jobs.response.count));
-  const stays = Object.keys(STAYS).map((stay, i) => ({stay, i})).filter(({i}) => tasks.some(({jobs}) => jobs.split.total_ns[i] > 0));
-  const columns = [column('task'), column(longest ? 'longest response' : 'mean response'), column('parts', 'The columns behind it, as shares', true),
-    ...stays.map(({stay}) => column(STAYS[stay], STAY_HELP[stay]))];
-  const delays = ['ready', 'preempted', 'device_queue'];
-  let dag = -1;
-  return table('Parts of response times', columns, tasks.map((task) => {
-    const first = task.dag !== dag;
-    dag = task.dag;
-    const look = hueOf(t, task.dag);
-    const lengths = lengthsOf(task);
-    const sum = lengths.reduce((a, b) => a + b, 0);
-    return {first, cells: [{text: named(look, `${group.dags[task.dag].name}.${task.name}`)}, timeCell(sum), {text: splitBar(t, lengths, look.color), sort: sum},
-      ...stays.map(({stay, i}) => timeCell(lengths[i], {kind: lengths[i] > 0 && delays.includes(stay) ? 'delay' : '', title: formatPercent(lengths[i] / Math.max(1, sum))}))]};
-  }));
-}
-
-/** Returns the responses of each sink of a DAG with several sinks. */
-function sinkTimes(group, dag) {
-  const {sinks} = dag.end_to_end;
-  if (sinks.length < 2) return undefined;
-  return sinks.map(({task, response}) => `${group.tasks[task].name}: p50 ${formatTime(response && response.p50_ns)}, `
-    + `p99 ${formatTime(response && response.p99_ns)}, max ${formatTime(response && response.max_ns)}`).join('\n');
-}
-
 function dagTable(group) {
   const t = theme();
   const columns = [
@@ -134,12 +81,12 @@ function dagTable(group) {
     column('most active / max_active', 'Most jobs in progress at any time, and the limit on them'),
   ];
   return table('DAGs', columns, group.dags.map((dag, d) => {
-    const r = dag.end_to_end.response;
+    const r = known(dag.end_to_end.response);
     const rate = dag.period_ns > 0 ? 1e9 / dag.period_ns : null;
     return {cells: [
       {text: named(hueOf(t, d), dag.cluster ? `${dag.name} (${dag.cluster})` : dag.name)}, countCell(dag.tasks),
       {text: rate === null ? '\u2013' : `${Number(rate.toPrecision(3))} Hz`, sort: rate},
-      countCell(dag.jobs.released), missCell(dag.jobs), ...percentileCells(r, 'p50', 'p99'), timeCell(r && r.max_ns, {title: sinkTimes(group, dag)}),
+      countCell(dag.jobs.released), missCell(dag.jobs), ...percentileCells(r, 'p50', 'p99', 'max'),
       boundCell(dag.bound_ns, r ? r.max_ns : 0, dag.method, dag.bound_alarm),
       timeCell(dag.deadline_ns > 0 ? dag.deadline_ns : null),
       dag.deadline_ns > 0 ? countCell(dag.end_to_end.late, {kind: dag.end_to_end.late > 0 ? 'missed' : 'met'}) : {text: '\u2013', sort: null},
@@ -154,7 +101,7 @@ function comparisonTable(groups, rows) {
   const several = groups.some((group) => group.runs.length > 1);
   const median = several ? 'Median of the repetitions' : '';
   const columns = [
-    column('DAG'), column('executor', '', true), column('jobs'), column('late', 'Jobs that finished after their deadline, or are overdue'),
+    column('DAG'), column('executor', '', 'text'), column('jobs'), column('late', 'Jobs that finished after their deadline, or are overdue'),
     column('missed', 'Late, skipped or aborted jobs, of all released jobs'),
     ...['p50', 'p95', 'p99'].map((name) => column(several ? `${name}, median` : name, `${help}${median}`)),
     column(several ? 'max of all' : 'max', `${help}${several ? 'The largest of all repetitions' : ''}`), column('deadline', 'Of the response end to end'),
@@ -165,20 +112,5 @@ function comparisonTable(groups, rows) {
     shareCell(cell.missed, cell.released, {kind: cell.missed > 0 ? 'missed' : 'met', title: range(cell.miss_ratio)}),
     ...['p50_ns', 'p95_ns', 'p99_ns'].map((key) => timeCell(cell[key] && cell[key].median)),
     timeCell(cell.max_ns, {kind: lateKind(cell.end_to_end_late > 0)}), timeCell(cell.deadline_ns),
-  ]}))));
-}
-
-function runTable(groups) {
-  const columns = [
-    column('run'), column('recorded', 'UTC', true), column('seed'), column('jobs'), column('missed'), column('workers busy'), column('rules checked'), column('violations'),
-    column('priority inversions', 'Intervals in which a more urgent job waited while a less urgent one ran'), column('longest'),
-  ];
-  return table('Runs', columns, groups.flatMap((group) => group.runs.map((run) => ({cells: [
-    {text: element('span', {title: run.path}, ...breakable(run.path.split('/').slice(-2).join('/')))},
-    {text: run.provenance ? run.provenance.created : '\u2013', title: run.provenance ? Object.entries(run.provenance).map(([key, value]) => `${key}: ${value}`).join('\n') : undefined},
-    {text: String(run.seed), sort: run.seed}, countCell(run.released), shareCell(run.missed, run.released, {kind: run.missed > 0 ? 'missed' : 'met'}),
-    run.worker_busy.map((share) => `${(100 * share).toFixed(0)}\u00a0%`).join(', '), countCell(run.checks),
-    countCell(run.violation_count, {kind: run.violation_count > 0 ? 'missed' : 'met', title: run.violations.join('\n')}),
-    countCell(run.inversions.count), timeCell(run.inversions.longest_ns),
   ]}))));
 }

@@ -18,12 +18,11 @@ function causesTable({causes}) {
 function partsBar(job) {
   const t = theme();
   const {length_ns: lengths, text, work} = job.parts;
+  const share = (length) => 100 * length / Math.max(1, job.length_ns);
   let at = 0;
   const parts = lengths.map((length, i) => {
-    const x = 100 * at / Math.max(1, job.length_ns);
     at += length;
-    const width = 100 * length / Math.max(1, job.length_ns);
-    return svgElement('rect', {x: x.toFixed(3), y: 0, width: width.toFixed(3), height: 16, fill: work[i] ? t.soft : t.delay,
+    return svgElement('rect', {x: share(at - length).toFixed(3), y: 0, width: share(length).toFixed(3), height: 16, fill: work[i] ? t.soft : t.delay,
       opacity: work[i] || i % 2 === 0 ? 1 : 0.6}, svgElement('title', {}, `${text[i]}: ${formatTime(length)}`));
   });
   return svgElement('svg', {class: 'parts', viewBox: '0 0 100 16', preserveAspectRatio: 'none', role: 'img',
@@ -32,12 +31,10 @@ function partsBar(job) {
 
 function partsTable(job) {
   const {begin_ns: begins, length_ns: lengths, text, work} = job.parts;
-  const columns = [column(job.end_to_end ? 'since its data began' : 'since its release'), column('nanoseconds'), column('share'), column('what happened', '', true)];
-  const share = (length) => formatPercent(length / Math.max(1, job.length_ns));
-  const rows = lengths.map((length, i) => ({cells: [begins[i] === null ? '\u2013' : formatTime(begins[i]), formatCount(length), share(length),
+  const columns = [column(job.end_to_end ? 'since its data began' : 'since its release'), column('nanoseconds'), column('share'), column('what happened', '', 'text')];
+  const rows = lengths.map((length, i) => ({cells: [timeCell(begins[i]), countCell(length), {text: formatPercent(length / Math.max(1, job.length_ns)), sort: length},
     {text: text[i], kind: work[i] ? '' : 'delay'}]}));
-  rows.push({first: true, cells: ['in all', formatCount(job.length_ns), share(job.length_ns), '']});
-  return element('div.why', {}, table('Parts of the job', columns, rows, {sortable: false, most: Infinity}));
+  return element('div.why', {}, table('Parts of the job', columns, rows, {most: Infinity}));
 }
 
 /** Returns which run was looked into: "", or "repetition-2, the worst of 3 runs". */
@@ -50,49 +47,27 @@ function nameOfWorstRun({runs, worst_run: worst}) {
  * reader wants to see. Null without a miss.
  */
 function worstMisses(groups, look) {
-  const rows = groups.flatMap((group, g) => {
-    const {misses, worst, jobs} = group.why;
-    const name = groups.length > 1 ? element('h3', {}, named(shadeOf(theme(), g), group.label)) : null;
-    if (misses === 0) return groups.length > 1 ? [element('div', {}, name, element('p.met', {}, 'No deadline missed.'))] : [];
-    const {text, remedy} = jobs.find(({task, number}) => task === worst.task[0] && number === worst.number[0]);
-    const run = nameOfWorstRun(group);
-    return [element('div', {}, name, element('p', {}, element('button.link.missed', {type: 'button', onclick: () => look(g)}, text),
-      element('span.soft', {}, ` ${formatTime(worst.since[0])} after the start${run ? ` of ${run}` : ''}`)),
-    element('p', {}, element('b', {}, 'Cause: '), worst.main[0] ? `${worst.main[0]} for ${formatTime(worst.main_ns[0])}` : 'lost at its release'),
-    remedy ? element('p', {}, element('b', {}, 'What to change: '), remedy) : null)];
-  });
   if (groups.every(({why}) => why.misses === 0)) return null;
-  return element('section.worst', {}, heading(2, 'worst-miss', groups.length > 1 ? 'The worst miss of each executor' : 'The worst miss'), ...rows);
+  const parts = groups.map((group, g) => {
+    const name = groups.length > 1 ? element('h3', {}, named(shadeOf(theme(), g), group.label)) : null;
+    if (group.why.misses === 0) return element('div', {}, name, element('p.met', {}, 'No deadline missed.'));
+    const {text, since_ns: since, cause, cause_ns: length, remedy} = group.why.jobs[0];
+    const run = nameOfWorstRun(group);
+    return element('div', {}, name, element('p', {}, element('button.link.missed', {type: 'button', onclick: () => look(g)}, text),
+      element('span.soft', {}, ` ${formatTime(since)} after the start${run ? ` of ${run}` : ''}`)),
+    element('p', {}, element('b', {}, 'Cause: '), cause ? `${cause} for ${formatTime(length)}` : 'lost at its release'),
+    remedy ? element('p', {}, element('b', {}, 'What to change: '), remedy) : null);
+  });
+  return element('section.worst', {}, heading(2, 'worst-miss', groups.length > 1 ? 'The worst miss of each executor' : 'The worst miss'), ...parts);
 }
 
 /** Returns the section and a function that shows a job in it: show(task, number, missed). */
 function whySection(groups, state) {
   const why = () => groups[state.executor].why;
-  const nameOf = (task, number) => `${taskName(groups[state.executor], task)}#${number}`;
+  const nameOf = ({task, number}) => `${taskName(groups[state.executor], task)}#${number}`;
   const command = (name) => `redag why ${groups[state.executor].runs[0].path} ${name}`;
-  // The chosen job; at first the worst one.
-  function chosen() {
-    const {worst} = why();
-    return state.why || (worst.task.length === 0 ? null : {task: worst.task[0], number: worst.number[0], missed: why().misses > 0});
-  }
-  const isChosen = (task, number) => chosen() !== null && chosen().task === task && chosen().number === number;
-  const panel = element('div', {'aria-live': 'polite'});
-  function fillPanel() {
-    if (chosen() === null) return [];
-    const job = why().jobs.find(({task, number}) => isChosen(task, number));
-    if (job) return [element(job.missed ? 'p.job.missed' : 'p.job', {}, job.text), partsBar(job), partsTable(job)];
-    const name = nameOf(chosen().task, chosen().number);
-    return [element('p.soft', {}, `${name} ${chosen().missed ? 'missed its deadline' : 'met its deadline'} and is not among the jobs explained here: ${command(name)}`)];
-  }
-
-  function show(task, number, missed) {
-    state.why = {task, number, missed};
-    const hadFocus = list.contains(document.activeElement);
-    list.refill();
-    if (hadFocus) list.querySelector('tr[aria-current] button').focus();
-    panel.replaceChildren(...fillPanel());
-    panel.scrollIntoView({block: 'nearest'});
-  }
+  const chosen = () => state.why || why().jobs[0];  // at first the worst one
+  const isChosen = ({task, number}) => chosen().task === task && chosen().number === number;
 
   const intro = place(() => {
     const {misses, explained} = why();
@@ -100,33 +75,41 @@ function whySection(groups, state) {
     const words = misses === 0 ? `No deadline was missed. These are the jobs of ${run} that came closest, and what took their time.`
       : `${formatCount(misses)} job${misses === 1 ? '' : 's'} missed a deadline in ${run}. ${misses > explained ? `The causes cover the worst ${formatCount(explained)}. ` : ''}`
         + 'A job chosen in the list, or clicked on in the schedule, is explained below the list.';
-    return [element('p.soft', {}, words)];
+    return [element('p.soft', {}, words), why().causes.length === 0 ? '' : causesTable(why())];
   });
-  const causes = place(() => (why().causes.length === 0 ? [] : [causesTable(why())]));
   const list = place(() => {
-    const {worst, misses} = why();
-    const columns = [column('job'), column('late by', 'After its deadline; negative: time to spare'), column('outcome', '', true), column('released', 'Since the start of the run'),
-      column('main cause', '', true)];
-    const rows = worst.task.map((task, i) => {
-      const name = nameOf(task, worst.number[i]);
-      const missed = misses > 0;
-      const reason = wordsAt(REASONS, worst.reason[i]);
-      return {current: isChosen(task, worst.number[i]), cells: [
-        {text: element('button.link', {type: 'button', onclick: () => show(task, worst.number[i], missed)}, ...breakable(name)), sort: name},
-        timeCell(worst.lateness[i], {kind: lateKind(missed)}),
-        `${wordsAt(OUTCOMES, worst.outcome[i])}${reason ? `: ${reason}` : ''}`, timeCell(worst.since[i]), worst.main[i] || 'lost at its release']};
-    });
-    return [element('div.why', {}, table('The worst jobs', columns, rows, {most: MOST_LISTED_AT_ONCE, total: Math.max(misses, rows.length)})),
-      misses > rows.length ? element('p.soft', {}, `All of them: ${command('--all')}`) : null].filter(Boolean);
+    const {jobs, misses} = why();
+    const columns = [column('job'), column('late by', 'After its deadline; negative: time to spare'), column('outcome', '', 'text'), column('released', 'Since the start of the run'),
+      column('main cause', '', 'text')];
+    const rows = jobs.map((job) => ({current: isChosen(job), cells: [
+      {text: element('button.link', {type: 'button', onclick: () => show(job.task, job.number, job.missed)}, ...breakable(nameOf(job))), sort: nameOf(job)},
+      timeCell(job.lateness_ns, {kind: lateKind(job.missed)}), [OUTCOMES[job.outcome], REASONS[job.reason]].filter(Boolean).join(': '), timeCell(job.since_ns),
+      job.cause || 'lost at its release']}));
+    return [element('div.why', {}, table('The worst jobs', columns, rows, {most: MOST_LISTED_AT_ONCE, total: misses})),
+      misses > rows.length ? element('p.soft', {}, `All of them: ${command('--all')}`) : ''];
   });
-  const refillAll = () => {
-    [intro, causes, list].forEach((node) => node.refill());
-    panel.replaceChildren(...fillPanel());
-  };
+  const panel = place(() => {
+    if (!chosen()) return [];
+    const job = why().jobs.find(isChosen);
+    if (job) return [element(job.missed ? 'p.job.missed' : 'p.job', {}, job.text), partsBar(job), partsTable(job)];
+    const name = nameOf(chosen());
+    return [element('p.soft', {}, `${name} ${chosen().missed ? 'missed its deadline' : 'met its deadline'} and is not among the jobs explained here: ${command(name)}`)];
+  });
+  panel.setAttribute('aria-live', 'polite');
+
+  function show(task, number, missed) {
+    state.why = {task, number, missed};
+    const hadFocus = list.contains(document.activeElement);
+    list.refill();
+    if (hadFocus) list.querySelector('tr[aria-current] button').focus();
+    panel.refill();
+    panel.scrollIntoView({block: 'nearest'});
+  }
+  const refillAll = () => [intro, list, panel].forEach((node) => node.refill());
   themed.push(refillAll);
   refillAll();
   return {
-    nodes: [heading(2, 'why', 'Why were jobs late?'), intro, causes, heading(3, 'worst', 'The worst jobs'), list, panel],
+    nodes: [heading(2, 'why', 'Why were jobs late?'), intro, heading(3, 'worst', 'The worst jobs'), list, panel],
     refill() {
       state.why = null;
       refillAll();
