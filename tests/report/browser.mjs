@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Opens report pages in Chromium. Every figure must be drawn and can be saved. No error may be logged, nothing may be
+// Opens report pages in Chromium. Every figure must be drawn. No error may be logged, nothing may be
 // requested from the network or be wider than a phone, and hostile names must stay text. Leaves screenshots for
 // inspection.
 import assert from 'node:assert/strict';
@@ -155,23 +155,6 @@ await test('phone: neither the page nor a table is wider than the screen', async
   }
 });
 
-await test('print: white paper, all figures, also from a dark screen', async () => {
-  const {page, problems, close} = await open('comparison', {colorScheme: 'dark'});
-  await page.emulateMedia({media: 'print', colorScheme: 'dark'});
-  await page.setViewportSize({width: 700, height: 990});
-  await page.evaluate(() => window.dispatchEvent(new Event('beforeprint')));
-  assert.equal(await page.evaluate(() => getComputedStyle(document.body).backgroundColor), 'rgb(255, 255, 255)');
-  assert.deepEqual(await page.locator('button:visible:not(.sort, .link)').allInnerTexts(), ['redag'], 'of all buttons, only which executor it is');
-  await assertAllDrawn(page, FIGURES.comparison);
-  await page.screenshot({path: shot('print'), fullPage: true});
-  await page.evaluate(() => window.dispatchEvent(new Event('afterprint')));
-  assert.notEqual(await page.evaluate(() => getComputedStyle(document.body).backgroundColor), 'rgb(255, 255, 255)');
-  const pdf = await page.pdf({path: path.join(scratch, 'screenshots', 'print.pdf'), format: 'A4', preferCSSPageSize: true});
-  assert.ok(pdf.length > 20000);
-  none(problems);
-  await close();
-});
-
 await test('controls: each changes what it says', async () => {
   const {page, problems, close} = await open('comparison');
   const figure = (name) => page.locator(`figure[data-figure=${name}] .chart`);
@@ -302,7 +285,8 @@ await test('legends end where the buttons begin', async () => {
   for (const [name, options] of [['comparison', {}], ['wide', {}], ['comparison', {viewport: {width: 390, height: 844}}]]) {
     const {page, close} = await open(name, options);
     const beside = await page.evaluate(() => [...document.querySelectorAll('figure[data-figure]')].flatMap((box) => {
-      const buttons = box.querySelector('.tools').getBoundingClientRect();
+      const buttons = box.querySelector('.tools')?.getBoundingClientRect();
+      if (!buttons) return [];
       // A legend that has too little room is clipped and shows arrows.
       const end = (text) => {
         const clipped = text.closest('[clip-path]');
@@ -334,25 +318,6 @@ await test('hostile names stay text, also in tooltips', async () => {
   assert.equal(await page.evaluate(() => window.attacked), undefined);
   assert.equal(await page.locator('img').count(), 0);
   assert.match(await page.locator('h1').innerText(), /^<\/script><script>/);
-  none(problems);
-  await close();
-});
-
-await test('every figure is saved as SVG', async () => {
-  const {page, problems, close} = await open('comparison');
-  for (const name of FIGURES.comparison) {
-    const waiting = page.waitForEvent('download', {timeout: 20000});
-    await page.getByRole('button', {name: `${name}: save as SVG`, exact: true}).click();
-    const file = path.join(scratch, 'screenshots', `saved-${name}.svg`);
-    const download = await waiting;
-    assert.equal(download.suggestedFilename(), `redag-${name}.svg`);
-    await download.saveAs(file);
-    const text = fs.readFileSync(file, 'utf8');
-    assert.ok(text.startsWith('<svg') && text.length > 3000, `${name}.svg has ${text.length} characters`);
-    // Other programs read it as XML.
-    const mistake = await page.evaluate((xml) => new DOMParser().parseFromString(xml, 'image/svg+xml').querySelector('parsererror')?.textContent, text);
-    assert.equal(mistake, undefined, name);
-  }
   none(problems);
   await close();
 });

@@ -23,7 +23,7 @@ export async function browserOf([executablePath, scratch]) {
 
   /** Opens a page; `problems` collects what must not happen. */
   async function open(name, options = {}) {
-    const context = await browser.newContext({viewport: {width: 1280, height: 900}, colorScheme: 'light', acceptDownloads: true, ...options});
+    const context = await browser.newContext({viewport: {width: 1280, height: 900}, colorScheme: 'light', ...options});
     context.setDefaultTimeout(120000);  // a busy machine draws slowly
     const page = await context.newPage();
     const problems = [];

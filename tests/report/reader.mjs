@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Reads report pages as people do who use a keyboard, a screen reader, a phone or paper: the rules of axe-core, the
-// order of focus, sorting, contents, and what is printed.
+// Reads report pages as people do who use a keyboard, a screen reader or a phone: the rules of axe-core, the order of
+// focus, sorting, and contents.
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
 import path from 'node:path';
@@ -190,18 +190,6 @@ await test('the wheel scrolls the page over every figure, and zooms only with Ct
   assert.notEqual(await drawn(), closer);
   none(problems);
   await close();
-});
-
-await test('paper: a plausible number of pages', async () => {
-  for (const [name, most] of [['comparison', 9], ['single', 8], ['wide', 30], ['experiment', 9]]) {
-    const {page, problems, close} = await open(name, {colorScheme: 'dark'});
-    const pdf = await page.pdf({path: path.join(scratch, 'screenshots', `${name}.pdf`), format: 'A4', preferCSSPageSize: true});
-    const pages = pdf.toString('latin1').match(/\/Type\s*\/Page\b/g).length;
-    assert.ok(pages >= 2 && pages <= most, `${name} has ${pages} pages`);
-    console.log(`         ${name}: ${pages} pages`);
-    none(problems);
-    await close();
-  }
 });
 
 await end();

@@ -1,8 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// ECharts on this page: one theme, light or dark. Each chart is redrawn when theme, width or data change, and can be
-// saved as SVG.
+// ECharts on this page: one theme, light or dark. Each chart is redrawn when theme, width or data change.
 
 // What a colour means, here and in page.css. Nothing is told by colour alone: marks, names, dashes and patterns say the
 // same. No hue is near the red of misses, the green of what is met, or the orange of lost time, and all differ for
@@ -17,7 +16,7 @@ const PATTERNS = ['none', 'lines', 'dots'];
 
 const charts = [];
 const themed = [];   // functions to call when the theme changes
-let forced = null;  // 'light' or 'dark' if the reader or the printer chose it
+let forced = null;  // 'light' or 'dark' if the reader chose it
 
 const systemDark = window.matchMedia('(prefers-color-scheme: dark)');
 const themeName = () => forced || (systemDark.matches ? 'dark' : 'light');
@@ -60,7 +59,7 @@ function applyTheme() {
   charts.forEach((chart) => chart.draw());
 }
 
-const BUTTONS_WIDTH = 180;
+const BUTTONS_WIDTH = 140;
 const NARROW = 560;  // where the buttons are above the figure (page.css)
 
 // Adds the page's text, axes and tooltips to an option. The figure's own values take precedence.
@@ -76,7 +75,6 @@ function withTheme(option, t, width) {
   const axes = (own) => (Array.isArray(own) ? own.map(axis) : axis(own));
   return {
     animation: false,
-    // ECharts writes the names into a saved SVG between double quotes, without escaping.
     textStyle: {fontFamily: "system-ui, -apple-system, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif"},
     ...option,
     xAxis: axes(option.xAxis),
@@ -91,15 +89,6 @@ function withTheme(option, t, width) {
       backgroundColor: t.raised, borderColor: t.line, textStyle: {color: t.ink}, confine: true, ...option.tooltip,
     },
   };
-}
-
-function download(name, blob) {
-  const url = URL.createObjectURL(blob);
-  const link = element('a', {href: url, download: name});
-  document.body.append(link);
-  link.click();
-  link.remove();
-  setTimeout(() => URL.revokeObjectURL(url), 60000);  // a busy browser starts to read the URL late
 }
 
 /**
@@ -117,17 +106,12 @@ function figure({name, height, build, caption, canvas = false, label, onready, z
   }
   let chart = null;
 
-  function save() {
-    const drawing = echarts.init(null, null, {renderer: 'svg', ssr: true, width: place.clientWidth, height});
-    drawing.setOption({...chart.getOption(), backgroundColor: theme().paper});  // with the reader's zoom and legend
-    download(`redag-${name}.svg`, new Blob([drawing.renderToSVGString()], {type: 'image/svg+xml'}));
-    drawing.dispose();
-  }
   const tool = (text, what, act) => element('button', {type: 'button', title: what, 'aria-label': `${name}: ${what}`, onclick: () => { if (chart) act(); }}, text);
-  box.prepend(element('span.tools.controls', {role: 'group', 'aria-label': `${label}: tools`},
-    ...(zooms ? [tool('\u2190', 'earlier', () => self.zoom(1, -0.5)), tool('\u2192', 'later', () => self.zoom(1, 0.5)),
-      tool('+', 'zoom in', () => self.zoom(2, 0)), tool('\u2212', 'zoom out', () => self.zoom(0.5, 0))] : []),
-    tool('SVG', 'save as SVG', save)));
+  if (zooms) {
+    box.prepend(element('span.tools.controls', {role: 'group', 'aria-label': `${label}: tools`},
+      tool('\u2190', 'earlier', () => self.zoom(1, -0.5)), tool('\u2192', 'later', () => self.zoom(1, 0.5)),
+      tool('+', 'zoom in', () => self.zoom(2, 0)), tool('\u2212', 'zoom out', () => self.zoom(0.5, 0))));
+  }
 
   const self = {
     box,
@@ -169,13 +153,3 @@ window.addEventListener('resize', () => {
   charts.forEach((chart) => chart.draw());
 });
 systemDark.addEventListener('change', applyTheme);
-// Paper is white, and narrower than most windows.
-let beforePrint = null;  // the theme that the reader chose
-function print(isPaper) {
-  if (isPaper) beforePrint = forced;
-  forced = isPaper ? 'light' : beforePrint;
-  document.getElementById('report').style.width = isPaper ? '700px' : '';
-  applyTheme();
-}
-window.addEventListener('beforeprint', () => print(true));
-window.addEventListener('afterprint', () => print(false));

@@ -51,7 +51,7 @@ function pageFooter({version, provenance}) {
   const made = provenance ? [`Page made ${provenance.created} by ${programOf(provenance)} on ${provenance.host}: `, element('code', {}, provenance.command), '. ']
     : [`Page made by redag ${version}. `];
   return element('footer', {}, ...made, `Figures: Apache ECharts ${echarts.version} (Apache License 2.0). `
-    + 'This file uses no network. A button above each figure saves it as SVG.');
+    + 'This file uses no network.');
 }
 
 /** Returns links to all headings. */

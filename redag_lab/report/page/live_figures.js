@@ -71,7 +71,7 @@ function liveRows({dags, tasks}, view) {
     const {misses: lately} = row.recent;
     const isFull = row.max_active > 0 && row.active >= row.max_active;
     return {first: row.isDag, cells: [
-      {text: row.full, kind: lately > 0 ? 'missed' : row.isDag ? '' : 'again'}, perSecond(row.rate), ...[p50, p99, max].map((ns) => timeOf(ns, row)),
+      {text: row.full, kind: [row.isDag ? '' : 'again', lately > 0 ? 'missed' : ''].filter(Boolean).join('.')}, perSecond(row.rate), ...[p50, p99, max].map((ns) => timeOf(ns, row)),
       timeCell(row.deadline_ns), timeCell(row.bound_ns), countCell(row.misses, {kind: lately > 0 ? 'missed' : row.misses > 0 ? 'delay' : ''}), countCell(lately, {kind: lately > 0 ? 'missed' : ''}),
       {text: row.max_active > 0 ? `${row.active}/${row.max_active}` : String(row.active), sort: row.active, kind: isFull ? 'delay' : ''},
       countCell(row.away), countCell(row.ready), countCell(row.waiting), {text: formatPercent(row.cpu), sort: row.cpu},
