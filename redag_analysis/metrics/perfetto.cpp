@@ -81,6 +81,11 @@ class PerfettoWriter::Impl {
       const TaskId task = judged.record.task;
       if (Live *const job = find(task, judged.record.number); job != nullptr) close(*job, task, last_time_, judged);
     });
+    write(ready_);
+    for (DagCounters &dag : dags_) {
+      write(dag.active);
+      write(dag.misses);
+    }
     return writer_.commit();
   }
 
@@ -106,7 +111,9 @@ class PerfettoWriter::Impl {
   };
   struct Counter {
     std::uint64_t track = 0;
+    Time changed = 0;
     std::int64_t value = 0;
+    std::int64_t written = 0;
   };
   struct DagCounters {
     Counter active;
@@ -124,7 +131,16 @@ class PerfettoWriter::Impl {
   }
 
   void count(Counter &counter, std::int64_t by) {
-    writer_.count(counter.track, since_start(last_time_), counter.value += by);
+    const Time now = since_start(last_time_);
+    if (now > counter.changed) write(counter);
+    counter.changed = now;
+    counter.value += by;
+  }
+
+  // Of several changes at one time, only the last value is written, and only if it is another one.
+  void write(Counter &counter) {
+    if (counter.value != counter.written) writer_.count(counter.track, counter.changed, counter.value);
+    counter.written = counter.value;
   }
 
   // States what the run was, as an event at its beginning.

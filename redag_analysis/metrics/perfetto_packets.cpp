@@ -20,7 +20,9 @@ constexpr int kLevel = 3;                              // of zlib: half the time
 using Field = std::uint32_t;
 constexpr Field kPacket = 1;  // of Trace
 struct TracePacket {
-  static constexpr Field kTimestamp = 8, kSequence = 10, kTrackEvent = 11, kCompressed = 50, kTrackDescriptor = 60;
+  static constexpr Field kTimestamp = 8, kSequence = 10, kTrackEvent = 11, kSequenceFlags = 13, kCompressed = 50;
+  static constexpr Field kTrackDescriptor = 60;
+  static constexpr std::uint64_t kStateCleared = 1;  // of the first packet of a sequence
 };
 struct TrackDescriptor {
   static constexpr Field kUuid = 1, kName = 2, kParent = 5, kCounter = 8, kChildOrdering = 11, kSiblingOrder = 12;
@@ -105,7 +107,12 @@ void add_arguments(Message &event, std::span<const Argument> arguments) {
 
 }  // namespace
 
-PacketWriter::PacketWriter(trace::OutputFile file) : file_(std::move(file)) { raw_.reserve(kBlock + kBlock / 4); }
+PacketWriter::PacketWriter(trace::OutputFile file) : file_(std::move(file)) {
+  raw_.reserve(kBlock + kBlock / 4);
+  Message packet(raw_, kPacket);
+  packet.add(TracePacket::kSequence, 1);
+  packet.add(TracePacket::kSequenceFlags, TracePacket::kStateCleared);
+}
 
 std::uint64_t PacketWriter::add_track(std::string_view name, std::uint64_t parent, bool is_counter) {
   const std::uint64_t id = ++tracks_;

@@ -69,6 +69,10 @@ class PictureReader {
           event = packet.get_message();
           has_event = true;
           break;
+        case 13:
+          EXPECT_EQ(packet.get_uint32(), 1U);
+          EXPECT_EQ(picture_.packets, 0U) << "that begins the sequence";
+          break;
         case 50: {
           const std::string packets = inflated(packet.get_view());
           picture_.bytes += packets.size();
