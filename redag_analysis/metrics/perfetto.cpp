@@ -59,10 +59,6 @@ class PerfettoWriter::Impl {
       case JobEventKind::Deferred: mark(event, "deferred"); break;
       case JobEventKind::Exceeded: mark(event, "budget used"); break;
       case JobEventKind::Dispatched:
-        if (!std::exchange(job->is_started, true)) count(dag_of(event.task).active, 1);
-        leave_ready(*job);
-        open_slice(event, *job);
-        break;
       case JobEventKind::Resumed: open_slice(event, *job); break;
       case JobEventKind::Preempted: close_slice(*job, event.time); break;
       case JobEventKind::Waits:
@@ -81,11 +77,6 @@ class PerfettoWriter::Impl {
       const TaskId task = judged.record.task;
       if (Live *const job = find(task, judged.record.number); job != nullptr) close(*job, task, last_time_, judged);
     });
-    write(ready_);
-    for (DagCounters &dag : dags_) {
-      write(dag.active);
-      write(dag.misses);
-    }
     return writer_.commit();
   }
 
@@ -93,8 +84,6 @@ class PerfettoWriter::Impl {
   struct Live {
     std::uint32_t number = 0;
     std::size_t lane = 0;
-    bool is_ready = false;
-    bool is_started = false;
     std::uint32_t worker = WorkerId::kNoneValue;  // on which it has an open slice
     std::vector<std::uint64_t> flows;             // of the data that it will use
   };
@@ -109,38 +98,18 @@ class PerfettoWriter::Impl {
     std::vector<Live> live;                 // jobs
     std::vector<std::uint32_t> successors;  // tasks that use its data
   };
-  struct Counter {
-    std::uint64_t track = 0;
-    Time changed = 0;
-    std::int64_t value = 0;
-    std::int64_t written = 0;
-  };
-  struct DagCounters {
-    Counter active;
-    Counter misses;
+  struct Misses {
+    std::uint64_t counter = 0;
+    std::int64_t count = 0;
   };
 
   // The beginning of the run is time 0 of the file.
   [[nodiscard]] Time since_start(Time time) const { return std::max<Duration>(time - run_.start, 0); }
-  [[nodiscard]] DagCounters &dag_of(TaskId task) { return dags_[refs_[task.value].dag.value]; }
 
   Live *find(TaskId task, std::uint32_t number) {
     std::vector<Live> &live = tasks_[task.value].live;
     const auto job = std::find_if(live.begin(), live.end(), [&](const Live &one) { return one.number == number; });
     return job == live.end() ? nullptr : &*job;
-  }
-
-  void count(Counter &counter, std::int64_t by) {
-    const Time now = since_start(last_time_);
-    if (now > counter.changed) write(counter);
-    counter.changed = now;
-    counter.value += by;
-  }
-
-  // Of several changes at one time, only the last value is written, and only if it is another one.
-  void write(Counter &counter) {
-    if (counter.value != counter.written) writer_.count(counter.track, counter.changed, counter.value);
-    counter.written = counter.value;
   }
 
   // States what the run was, as an event at its beginning.
@@ -168,7 +137,6 @@ class PerfettoWriter::Impl {
 
   void add_workers() {
     workers_track_ = writer_.add_track("workers (" + run_.executor + ", " + run_.preemption + ")").id;
-    ready_.track = writer_.add_counter("ready jobs", workers_track_);
     for (const ClusterPart &part : parts_of(run_.workload)) {
       if (!part.is_cluster()) continue;
       for (std::uint32_t w = 0; w < part.workload.platform.workers; ++w) {
@@ -189,7 +157,7 @@ class PerfettoWriter::Impl {
   void add_tasks() {
     for (const Dag &dag : run_.workload.dags) {
       const std::uint64_t parent = writer_.add_track("DAG " + dag.name).id;
-      dags_.push_back({{writer_.add_counter("jobs in progress", parent)}, {writer_.add_counter("misses", parent)}});
+      misses_.push_back({writer_.add_counter("misses", parent)});
       const std::size_t first = tasks_.size();
       for (const Task &task : dag.tasks) {
         tasks_.push_back(
@@ -232,7 +200,6 @@ class PerfettoWriter::Impl {
   }
 
   void become_ready(const JobEvent &event, Live &job) {
-    if (!std::exchange(job.is_ready, true)) count(ready_, 1);
     const TaskRef &ref = refs_[event.task.value];
     for (const std::uint32_t p : ref.task->predecessors) {
       const auto flow = flows_.find({event.task.value - ref.index + p, event.task.value});
@@ -240,10 +207,6 @@ class PerfettoWriter::Impl {
       job.flows.push_back(flow->second);
       flows_.erase(flow);
     }
-  }
-
-  void leave_ready(Live &job) {
-    if (std::exchange(job.is_ready, false)) count(ready_, -1);
   }
 
   void open_slice(const JobEvent &event, Live &job) {
@@ -296,9 +259,9 @@ class PerfettoWriter::Impl {
     if (judged.miss != Miss::None) arguments.push_back({"miss", to_text(judged.miss)});
     if (record.reason != Reason::None) arguments.push_back({"reason", to_string(record.reason)});
     writer_.end(lane, since_start(end), arguments, leaving);
-    leave_ready(job);
-    if (job.is_started) count(dag_of(id).active, -1);
-    if (judged.miss != Miss::None) count(dag_of(id).misses, 1);
+    if (judged.miss == Miss::None) return;
+    Misses &misses = misses_[refs_[id.value].dag.value];
+    writer_.count(misses.counter, since_start(last_time_), ++misses.count);
   }
 
   PacketWriter writer_;
@@ -306,8 +269,7 @@ class PerfettoWriter::Impl {
   std::vector<TaskRef> refs_;
   DeadlineWatch watch_;
   std::uint64_t workers_track_ = 0;
-  Counter ready_;
-  std::vector<DagCounters> dags_;
+  std::vector<Misses> misses_;  // by DagId
   std::vector<TaskState> tasks_;
   std::unordered_map<std::uint32_t, Worker> workers_;
   // The arrow from the last finished job of a task to a successor's next job, by both tasks, until it is drawn.

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Writes trace.pftrace for ui.perfetto.dev and trace_processor: a track for each worker with the jobs that it ran, for
-// each task with its jobs from release to end, and counters. docs/results_format.md describes them. Events are written
-// as they are read; memory does not grow with the run.
+// each task with its jobs from release to end, and each DAG's misses. docs/results_format.md describes them. Events are
+// written as they are read; memory does not grow with the run.
 #pragma once
 
 #include <memory>
