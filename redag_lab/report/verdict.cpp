@@ -96,7 +96,11 @@ void add_assumptions(const Group &group, std::vector<Sentence> &sentences) {
   std::vector<std::string> alarms;
   std::vector<std::string> notes;
   for (metrics::Remark &remark : metrics::remarks(group.assumptions, group.workload())) {
-    remark.is_alarm ? alarms.push_back(remark.text + ".") : notes.push_back(std::move(remark.text));
+    if (remark.is_alarm) {
+      alarms.push_back(remark.text + ".");
+    } else {
+      notes.push_back(std::move(remark.text));
+    }
   }
   add_bad(alarms, sentences);
   if (!notes.empty()) {
