@@ -228,23 +228,27 @@ Duration Contention::sum_works(std::size_t resource, Duration window) {
   return sum;
 }
 
-// Returns at least the most instants in which jobs of a path wait for the resource, all of whose servers are busy.
+// Returns the most instants in which jobs of a path wait for the resource, all of whose servers are busy: the largest y
+// with n y <= min(own, (tasks - 1) y) + sum min(W_j, c_j y) + blocking, found as dag_bounded() finds it.
 Duration Contention::instants(std::size_t resource, Duration others) const {
   const Demand &own = demands_[units_[k_].unit][resource];
   const Duration servers = resources_[resource].servers;
   const Duration off_path = own.work.volume - own.path;
   const Duration blocked = multiply(own.requests, blocking_[resource]);
   Duration most = saturate((Int128{off_path} + others + blocked) / servers);
-  for (int round = 0; round < kRounds && most > 0 && most < kUnbounded; ++round) {
+  while (most < kUnbounded) {
     Effort::spend(k_ + 1);
-    Int128 sum = Int128{blocked} + std::min(Int128{off_path}, Int128{own.tasks - 1} * most);
-    for (std::size_t j = 0; j < k_; ++j) {
-      const Duration width = demands_[units_[j].unit][resource].work.width;
-      sum += std::min(Int128{works_[j]}, Int128{width} * most);
-    }
-    const Duration tighter = saturate(sum / servers);
-    if (tighter >= most) break;
-    most = tighter;
+    Int128 constant = blocked;
+    Duration slope = 0;
+    const auto count = [&](Duration work, Duration width) {
+      const bool is_whole = work <= Int128{width} * most;
+      constant += is_whole ? work : 0;
+      slope += is_whole ? 0 : width;
+    };
+    count(off_path, Duration{own.tasks} - 1);
+    for (std::size_t j = 0; j < k_; ++j) count(works_[j], demands_[units_[j].unit][resource].work.width);
+    if (slope >= servers || constant / (servers - slope) >= most) break;
+    most = saturate(constant / (servers - slope));
   }
   return most;
 }

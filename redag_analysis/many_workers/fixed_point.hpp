@@ -16,9 +16,6 @@
 
 namespace redag::analysis::global {
 
-/// How many times the waiting time of one window is tightened; every round gives a valid one.
-inline constexpr int kRounds = 8;
-
 /// Finds a fixed point of a monotone `next`, from a `value` at or below the least one. Returns false if it is above
 /// `stop`. The last call of `next` was with the `value` found, and its side effects are those of that value. The result
 /// is the least fixed point unless the search takes more than kMaxSteps. Then it is one from farther ahead, found by

@@ -54,16 +54,24 @@ class Window {
     return sum;
   }
 
-  // Returns at least the largest y with m y <= min(V, r y) + sum min(W_j, c_j y) + B.
+  // Returns the largest y with m y <= min(V, r y) + sum min(W_j, c_j y) + B. The right-hand side is concave: where y is
+  // too large, the line that continues it bounds it from above, and meets m y at or above the result.
   [[nodiscard]] Duration busy_instants() const {
     Duration busy = (own_work_ + sum_ + blocking_) / workers_;
-    for (int round = 0; round < kRounds && busy > 0; ++round) {
-      const Duration own = std::min(own_work_, own_width_ * busy);
-      const Duration tighter = (own + others_in(busy)) / workers_;
-      if (tighter >= busy) break;
-      busy = tighter;
+    for (;;) {
+      Effort::spend(works_.size() + 1);
+      Duration constant = blocking_;
+      Duration slope = 0;
+      const auto count = [&](Duration work, Duration width) {
+        const bool is_whole = work <= width * busy;
+        constant += is_whole ? work : 0;
+        slope += is_whole ? 0 : width;
+      };
+      count(own_work_, own_width_);
+      for (std::size_t i = 0; i < works_.size(); ++i) count(works_[i], static_cast<Duration>(more_urgent_[i].width));
+      if (slope >= workers_ || constant / (workers_ - slope) >= busy) return busy;
+      busy = constant / (workers_ - slope);
     }
-    return busy;
   }
 
   std::span<const GlobalUnit> more_urgent_;
