@@ -86,34 +86,12 @@ void BM_GuanBare(benchmark::State &state) {
   });
 }
 
-void BM_BertognaCirineiBare(benchmark::State &state) {
-  const auto sets = task_sets(lab::DagShape::Independent, static_cast<std::uint32_t>(state.range(0)));
-  run_bare(state, bare(sets), [](std::vector<GlobalUnit> &units, std::size_t k) {
-    return analysis::global::bertogna_cirinei_response(units, k, kWorkers, analysis::global::start_after(units, k));
-  });
-}
-
 void BM_Guan(benchmark::State &state) { run_method(state, analysis::guan(), lab::DagShape::Independent); }
 
-void BM_MelaniBare(benchmark::State &state) {
-  const auto sets = task_sets(lab::DagShape::Layered, static_cast<std::uint32_t>(state.range(0)));
-  auto units = bare(sets);
-  for (auto &set : units) {
-    for (GlobalUnit &unit : set) analysis::global::set_width(unit, kWorkers);
-  }
-  run_bare(state, std::move(units), [](std::vector<GlobalUnit> &set, std::size_t k) {
-    return analysis::global::melani_response(set, k, kWorkers);
-  });
-}
-
-void BM_Melani(benchmark::State &state) { run_method(state, analysis::melani(), lab::DagShape::Layered); }
 void BM_DagBounded(benchmark::State &state) { run_method(state, analysis::dag_bounded(), lab::DagShape::Layered); }
 
 }  // namespace
 
 BENCHMARK(BM_GuanBare)->Arg(40)->Arg(60)->Arg(80);
-BENCHMARK(BM_BertognaCirineiBare)->Arg(40)->Arg(60)->Arg(80);
 BENCHMARK(BM_Guan)->Arg(40)->Arg(60)->Arg(80);
-BENCHMARK(BM_MelaniBare)->Arg(30)->Arg(60);
-BENCHMARK(BM_Melani)->Arg(30)->Arg(60);
 BENCHMARK(BM_DagBounded)->Arg(30)->Arg(60);

@@ -160,15 +160,12 @@ bool is_shown_schedulable(const TaskSet &task_set) {
   limits.itemised.which = Itemised::Which::None;
   std::vector<Tightest> tasks(task_set.tasks.size());
   std::vector<Tightest> dags(task_set.dags.size());
-  for (const bool quick : {true, false}) {
-    for (const Method &method : methods()) {
-      if (method.quick != quick) continue;
-      const MethodReport report = run(task_set, method, limits);
-      if (!report.trusted) continue;
-      if (report.verdict == Verdict::Schedulable) return true;
-      keep_tightest(tasks, report.bound()->tasks, method);
-      keep_tightest(dags, report.bound()->dags, method);
-    }
+  for (const Method &method : methods()) {
+    const MethodReport report = run(task_set, method, limits);
+    if (!report.trusted) continue;
+    if (report.verdict == Verdict::Schedulable) return true;
+    keep_tightest(tasks, report.bound()->tasks, method);
+    keep_tightest(dags, report.bound()->dags, method);
   }
   return verdict(task_set, combine(tasks, dags)) == Verdict::Schedulable;
 }

@@ -77,8 +77,8 @@ struct AnalyzeOptions {
 /// Combines the tightest bounds, as if one method had given them.
 [[nodiscard]] Bound tightest_of(const Report &report);
 
-/// True if analyze(task_set).verdict is Schedulable. For frequent calls: it runs the quick tests first, and stops at
-/// the first method that shows it. Throws Effort::GaveUp if a scope of the caller ends it.
+/// True if analyze(task_set).verdict is Schedulable. For frequent calls: it stops at the first method that shows it.
+/// Throws Effort::GaveUp if a scope of the caller ends it.
 [[nodiscard]] bool is_shown_schedulable(const TaskSet &task_set);
 
 }  // namespace redag::analysis

@@ -10,7 +10,6 @@
 #include "redag_analysis/one_worker/edf_demand.hpp"
 #include "redag_analysis/one_worker/paper.hpp"
 #include "redag_analysis/one_worker/response_time.hpp"
-#include "redag_analysis/one_worker/utilization.hpp"
 #include "tests/testing/bound_property.hpp"
 #include "tests/testing/builders.hpp"
 
@@ -60,7 +59,6 @@ TEST(Examples, BurnsWellings) {
 TEST(Examples, LehoczkyShaDing) {
   const std::vector<Load> tasks = {{40, 100}, {40, 150}, {100, 350}};
   EXPECT_EQ(responses(rta_preemptive(), tasks, kFull), (Durations{40, 80, 300}));
-  EXPECT_FALSE(accepts(hyperbolic_blocking(), compiled(in_one_dag(tasks), kFull)));
 }
 
 // J. Lehoczky, RTSS 1990: with deadlines above the period the first job is not the worst: 114, 102, 116, 104, 118, ...
@@ -92,17 +90,9 @@ TEST(Examples, DavisBurnsBrilLukkien) {
   EXPECT_EQ(verdict(task_set, std::get<Bound>(rta_nonpreemptive().apply(task_set))), Verdict::NotShown);
 }
 
-// E. Bini, G. Buttazzo, G. Buttazzo 2003: above the limit of Liu and Layland, within the hyperbolic bound.
-TEST(Examples, HyperbolicBeyondLiuLayland) {
-  const TaskSet task_set = compiled(in_one_dag({{50, 100}, {43, 130}}), kFull);
-  EXPECT_GT(task_set.utilization, 0.8285);
-  EXPECT_TRUE(accepts(hyperbolic_blocking(), task_set));
-}
-
 TEST(Examples, HarmonicPeriodsFillTheProcessor) {
   const std::vector<Load> full = {{1, 3}, {1, 6}, {6, 12}};
   EXPECT_EQ(responses(rta_preemptive(), full, kFull), (Durations{1, 2, 12})) << "U = 1 exactly, in thirds";
-  EXPECT_FALSE(accepts(hyperbolic_blocking(), compiled(in_one_dag(full), kFull)));
 }
 
 // By hand: a job of 20 that started just before holds the only worker for 19 more.

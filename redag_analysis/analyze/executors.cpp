@@ -5,19 +5,18 @@
 
 #include "redag_analysis/many_workers/dag_isolated.hpp"
 #include "redag_analysis/many_workers/global_dag.hpp"
-#include "redag_analysis/many_workers/global_sequential.hpp"
 #include "redag_analysis/peers/wait_set.hpp"
 #include "redag_analysis/peers/wait_set_rates.hpp"
 
 namespace redag::analysis {
 
 const std::vector<Method> &executor_methods() {
-  static const std::vector<Method> kAll = {wait_set_rates(), wait_set(), casini(), blass()};
+  static const std::vector<Method> kAll = {wait_set_rates(), wait_set(), casini()};
   return kAll;
 }
 
 const std::vector<Method> &methods_of(const executors::ExecutorKind &executor) {
-  static const std::vector<Method> kAnyOrder = {bertogna_cirinei_any(), long_paths(), dag_any()};
+  static const std::vector<Method> kAnyOrder = {long_paths(), dag_any()};
   static const std::vector<Method> kWaitSet = [] {
     std::vector<Method> all = executor_methods();
     all.insert(all.end(), kAnyOrder.begin(), kAnyOrder.end());

@@ -10,7 +10,6 @@
 #include "redag_analysis/many_workers/dag_shapes.hpp"
 #include "redag_analysis/many_workers/global_dag.hpp"
 #include "redag_analysis/many_workers/global_groups.hpp"
-#include "redag_analysis/many_workers/global_sequential.hpp"
 #include "redag_analysis/many_workers/suspension_aware.hpp"
 #include "redag_analysis/one_worker/response_time.hpp"
 #include "tests/testing/bound_property.hpp"
@@ -64,12 +63,12 @@ TEST(Losses, OneWorkerRateEdges) {
   testing::expect_bound_holds(dag_one_worker_preemptive(), with_losses(limits));
 }
 
-TEST(Losses, SeveralWorkers) { testing::expect_bound_holds(bertogna_cirinei(), with_losses(limits_for(2))); }
+TEST(Losses, SeveralWorkers) { testing::expect_bound_holds(dag_bounded(), with_losses(limits_for(2))); }
 
 TEST(Losses, SeveralWorkersDags) {
   BoundCaseLimits limits = limits_for(3);
   limits.edges = true;
-  testing::expect_bound_holds(melani(), with_losses(limits));
+  testing::expect_bound_holds(dag_bounded(), with_losses(limits));
 }
 
 TEST(Losses, SeveralWorkersRateEdges) {

@@ -14,7 +14,6 @@
 #include "redag_analysis/one_worker/edf_demand.hpp"
 #include "redag_analysis/one_worker/paper.hpp"
 #include "redag_analysis/one_worker/response_time.hpp"
-#include "redag_analysis/one_worker/utilization.hpp"
 
 namespace redag::analysis {
 
@@ -32,10 +31,7 @@ const std::vector<Method> &methods() {
       edf_demand_nonpreemptive(),
       // Several workers
       guan(),
-      bertogna_cirinei(),
-      bertogna_cirinei_any(),
       sequential_nonpreemptive(),
-      melani(),
       dag_shapes(),
       dag_bounded(),
       dag_nonpreemptive(),
@@ -49,9 +45,6 @@ const std::vector<Method> &methods() {
       // Several workers, edf
       edf_global_response(),
       edf_global_density(),
-      // Utilization
-      hyperbolic_blocking(),
-      global_rm_utilization(),
       // The equations of the paper
       paper_rm_bound(),
       paper_interference(),

@@ -11,7 +11,6 @@
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
 #include "redag_analysis/one_worker/response_time.hpp"
-#include "redag_analysis/one_worker/utilization.hpp"
 #include "redag_analysis/sim/simulator.hpp"
 #include "tests/testing/bound_property.hpp"
 
@@ -27,30 +26,10 @@ constexpr std::uint32_t kCases = 1000;
 
 const Bound *bound_of(const Outcome &outcome) { return std::get_if<Bound>(&outcome); }
 
-bool accepts(const Method &method, const TaskSet &task_set) {
-  const Outcome outcome = method.apply(task_set);
-  const Bound *bound = bound_of(outcome);
-  return bound != nullptr && verdict(task_set, *bound) == Verdict::Schedulable;
-}
-
 BoundCaseLimits blocked() {
   BoundCaseLimits limits;
   limits.groups = limits.levels = limits.overheads = true;
   return limits;
-}
-
-TEST(Relations, TheHyperbolicBoundAcceptsNothingThatResponseTimesDoNot) {
-  BoundCaseLimits limits = blocked();
-  limits.policies = {PolicyKind::RateMonotonic};
-  limits.min_deadline = 1.0;
-  limits.max_utilization = 0.9;
-  std::uint32_t accepted = 0;
-  for_cases(cases(limits), kCases, [&](const BoundCase &, const TaskSet &task_set, Rng &) {
-    const bool hyperbolic = accepts(hyperbolic_blocking(), task_set);
-    accepted += hyperbolic ? 1 : 0;
-    EXPECT_LE(hyperbolic, accepts(rta_preemptive(), task_set));
-  });
-  EXPECT_GT(accepted, kCases / 20);
 }
 
 std::vector<BoundCaseLimits> all_kinds() {

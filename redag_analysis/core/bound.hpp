@@ -91,7 +91,6 @@ struct Method {
   std::string_view assumptions{};  // when the method applies, in words
   std::string_view complexity{};
   std::string_view sound_only_if{};  // what the paper's own equations need to be sound; empty: nothing more
-  bool quick = false;                // its time is about linear in the tasks, so it is worth asking first
   bool knows_modes = false;          // it applies where there is a HI mode (TaskSet::has_modes)
   bool knows_waits = false;          // it covers tasks that wait (TaskSet::has_waits)
   std::function<Outcome(const TaskSet &task_set)> apply{};

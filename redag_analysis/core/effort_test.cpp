@@ -9,9 +9,8 @@
 #include <map>
 
 #include "redag_analysis/analyze/analyze.hpp"
-#include "redag_analysis/many_workers/global_sequential.hpp"
+#include "redag_analysis/many_workers/global_dag.hpp"
 #include "redag_analysis/one_worker/response_time.hpp"
-#include "redag_analysis/one_worker/utilization.hpp"
 #include "tests/testing/bound_property.hpp"
 #include "tests/testing/builders.hpp"
 
@@ -22,13 +21,14 @@ using testing::BoundCase;
 using testing::BoundCaseLimits;
 
 // Independent tasks of three periods that use half of the workers.
-TaskSet many_tasks(std::size_t count, std::uint32_t workers, Ties ties = Ties::Share) {
+TaskSet many_tasks(std::size_t count, std::uint32_t workers, Ties ties = Ties::Share,
+                   PolicyKind policy = PolicyKind::RateMonotonic) {
   std::vector<testing::Load> loads;
   for (std::size_t i = 0; i < count; ++i) {
     const Duration period = Duration{10} * static_cast<Duration>(i % 3 + 1) * kMillisecond;
     loads.push_back({period * workers / 2 / static_cast<Duration>(count), period});
   }
-  Workload workload = testing::independent(loads, workers);
+  Workload workload = testing::independent(loads, workers, policy);
   workload.ties = ties;
   return testing::compiled(workload);
 }
@@ -63,18 +63,18 @@ std::uint64_t steps_of(const Method &method, const TaskSet &task_set) {
 }
 
 TEST(Effort, AMethodGivesUpAtItsLimitAndTheOthersAnswer) {
-  const TaskSet task_set = many_tasks(1500, 2);
+  const TaskSet task_set = many_tasks(1500, 2, Ties::Share, PolicyKind::Edf);
   AnalyzeOptions options;
   options.effort = 1'000'000;
   const Report report = analyze(task_set, options);
-  const MethodReport &dear = report_of(report, "bertogna_cirinei");
+  const MethodReport &dear = report_of(report, "edf_global_response");
   EXPECT_TRUE(dear.gave_up());
   EXPECT_EQ(std::get<NotApplicable>(dear.outcome).reason, "more than 1 million steps");
   EXPECT_EQ(dear.verdict, Verdict::NotShown);
-  EXPECT_TRUE(report_of(report, "global_rm_utilization").bound()->accepts.value());
-  EXPECT_FALSE(report_of(report, "dag_groups").gave_up()) << "does not apply";
+  EXPECT_TRUE(report_of(report, "edf_global_density").bound()->accepts.value());
+  EXPECT_FALSE(report_of(report, "dag_bounded").gave_up()) << "does not apply";
   EXPECT_EQ(report.verdict, Verdict::Schedulable);
-  EXPECT_FALSE(report_of(analyze(task_set), "bertogna_cirinei").gave_up()) << "the usual effort is enough";
+  EXPECT_FALSE(report_of(analyze(many_tasks(1500, 2)), "dag_bounded").gave_up()) << "the usual effort is enough";
 }
 
 TEST(Effort, TheCallerEndsAMethodForAReason) {
@@ -92,8 +92,8 @@ TEST(Effort, TheCallerEndsAMethodForAReason) {
   const Report report = analyze(task_set, options);
   EXPECT_EQ(std::get<NotApplicable>(report_of(report, "guan").outcome).reason, "enough");
   EXPECT_EQ(asked["guan"], 1);
-  EXPECT_GT(asked["bertogna_cirinei"], 1);
-  EXPECT_FALSE(report_of(report, "bertogna_cirinei").gave_up());
+  EXPECT_GT(asked["dag_bounded"], 1);
+  EXPECT_FALSE(report_of(report, "dag_bounded").gave_up());
 }
 
 TEST(Effort, AScopeOfTheCallerEndsWhatIsInside) {
@@ -155,8 +155,8 @@ TEST(Effort, OneWorkerTakesLinearStepsInTasksOfFewPeriods) {
 
 // On several workers each task looks at all more urgent ones, in each of a few evaluations.
 TEST(Effort, SeveralWorkersTakeQuadraticStepsAtMost) {
-  const std::uint64_t few = steps_of(bertogna_cirinei(), many_tasks(300, 2));
-  const std::uint64_t many = steps_of(bertogna_cirinei(), many_tasks(1500, 2));
+  const std::uint64_t few = steps_of(dag_bounded(), many_tasks(300, 2));
+  const std::uint64_t many = steps_of(dag_bounded(), many_tasks(1500, 2));
   EXPECT_LE(many, 200 * few);
 }
 

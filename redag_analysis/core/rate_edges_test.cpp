@@ -97,8 +97,6 @@ TEST(BoundProperty, RatesOfSingleTasksOneWorker) {
   expect_bound_holds(rta_deferred(), cases(rates(sched::Preemption::Cooperative, 1)), kFew);
 }
 
-TEST(BoundProperty, RatesMelani) { expect_bound_holds(melani(), cases(rates(sched::Preemption::Full, 4)), kFew); }
-
 TEST(BoundProperty, RatesDagBounded) {
   expect_bound_holds(dag_bounded(), cases(rates(sched::Preemption::Full, 4)), kFew);
 }
@@ -147,7 +145,6 @@ TEST(BoundProperty, RatesDagGroups) {
 TEST(BoundProperty, RatesOfSingleTasks) {
   BoundCaseLimits limits = rates(sched::Preemption::Full, 4);
   expect_bound_holds(guan(), cases(limits), kFew);
-  expect_bound_holds(bertogna_cirinei(), cases(limits), kFew);
   limits.preemption = sched::Preemption::None;
   expect_bound_holds(sequential_nonpreemptive(), cases(limits), kFew);
 }
@@ -264,11 +261,11 @@ Workload two_sources(Phase first, Phase second, std::uint32_t workers) {
 TEST(RateEdges, SourcesOfTwoClocksAreNotReleasedTogether) {
   const TaskSet together = compiled(two_sources(Phase::Common, Phase::Common, 2), 2);
   EXPECT_FALSE(together.has_rate_edges());
-  EXPECT_EQ(milliseconds(bound_of(melani(), together).dags[0]), 2);
+  EXPECT_EQ(milliseconds(bound_of(dag_bounded(), together).dags[0]), 2);
   for (const Phase phase : {Phase::Unknown, Phase::Event}) {
     const TaskSet task_set = compiled(two_sources(phase, Phase::Common, 2), 2);
     ASSERT_EQ(task_set.units.size(), 3U);
-    const Bound bound = bound_of(melani(), task_set);
+    const Bound bound = bound_of(dag_bounded(), task_set);
     // x and y answer within 1 + 1, as three tasks share two workers, and j does so from when it is ready.
     EXPECT_EQ(milliseconds(bound.tasks[0]), 2);
     EXPECT_EQ(milliseconds(bound.tasks[2]), 2);
@@ -285,13 +282,13 @@ TEST(RateEdges, SourcesOfTwoClocksAreNotReleasedTogether) {
 // Nothing bounds how long one event waits for the other.
 TEST(RateEdges, TwoEventsThatAreJoinedHaveNoBoundEndToEnd) {
   const TaskSet task_set = compiled(two_sources(Phase::Event, Phase::Event, 2), 2);
-  const Bound bound = bound_of(melani(), task_set);
+  const Bound bound = bound_of(dag_bounded(), task_set);
   EXPECT_EQ(milliseconds(bound.tasks[2]), 2) << "from its own release";
   EXPECT_FALSE(bound.dags[0].response);
   EXPECT_THAT(bound.dags[0].absent, ::testing::HasSubstr("how long other data wait"));
   Workload workload = two_sources(Phase::Event, Phase::Common, 2);
   workload.dags[0].tasks[1].period = workload.dags[0].tasks[2].period = 30 * kMillisecond;
-  const Bound fast = bound_of(melani(), compiled(workload, 2));
+  const Bound fast = bound_of(dag_bounded(), compiled(workload, 2));
   EXPECT_FALSE(fast.tasks[2].response);
   EXPECT_THAT(fast.tasks[2].absent, ::testing::HasSubstr("a shorter period that come by events"));
 }
@@ -304,10 +301,10 @@ TEST(RateEdges, ATimerWaitsForDataOfAnotherClock) {
                       PreemptionMode::Os);
     workload.dags[0].tasks[0].phase = Phase::Unknown;
     workload.dags[0].tasks[1].offset = kMillisecond;
-    return bound_of(melani(), compiled(workload, 2)).tasks[1];
+    return bound_of(dag_bounded(), compiled(workload, 2)).tasks[1];
   };
-  // Data every 5 ms, 1 ms late at most: z is ready within 5.999999 ms. It shares two workers with one job of x.
-  EXPECT_EQ(bound(5).response, 5'999'999 + 1'500'000);
+  // Data every 5 ms, 1 ms late at most: z is ready within 5.999999 ms. x fills only one of the two workers.
+  EXPECT_EQ(bound(5).response, 5'999'999 + 1'000'000);
   EXPECT_FALSE(bound(20).response);
   EXPECT_THAT(bound(20).absent, ::testing::HasSubstr("nothing synchronises its timer"));
 }
@@ -322,7 +319,7 @@ TEST(RateEdges, WhatFollowsAJoinOfTwoClocksIsItsUnit) {
   const TaskSet task_set = compiled(workload, 2);
   EXPECT_EQ(task_set.units.size(), 3U);
   EXPECT_EQ(task_set.tasks[2].unit, task_set.tasks[3].unit);
-  const Bound bound = bound_of(melani(), task_set);
+  const Bound bound = bound_of(dag_bounded(), task_set);
   ASSERT_TRUE(bound.dags[0].response);
   EXPECT_EQ(*bound.dags[0].response, 10'000'000 + 2'500'000 + 3'000'000);
 }
@@ -339,7 +336,7 @@ dags:
       - {name: fuse, wcet: 1ms, activation: data, after: [scan, imu], callback: {node: /fuse, subscription: /x}}
 )";
   Workload workload = parse_workload(kFusion, "w.yaml").value().workload;
-  EXPECT_EQ(milliseconds(bound_of(melani(), compiled(workload, 2)).dags[0]), 50 + 2 + 2);
+  EXPECT_EQ(milliseconds(bound_of(dag_bounded(), compiled(workload, 2)).dags[0]), 50 + 2 + 2);
   workload.dags[0].tasks[0].callback->kind = Callback::Kind::Service;
   EXPECT_EQ(compiled(workload, 2).tasks[0].has_gaps, true);
 }
@@ -356,8 +353,8 @@ TEST(RateEdges, ExecutorsHaveNoCommonClock) {
 TEST(RateEdges, OtherMethodsRefuseThem) {
   const Workload workload =
       make_workload({make_dag("d", {{.name = "a", .period = 5}, {.name = "b", .period = 10, .after = {0}}})}, 1);
-  constexpr std::string_view kKnow[] = {"rta_preemptive", "dag_one_worker_preemptive", "melani",    "dag_bounded",
-                                        "guan",           "bertogna_cirinei",          "dag_shapes"};
+  constexpr std::string_view kKnow[] = {"rta_preemptive", "dag_one_worker_preemptive", "dag_bounded", "guan",
+                                        "dag_shapes"};
   for (const std::uint32_t workers : {1U, 2U}) {
     for (const MethodReport &report : analyze(compiled(workload, workers)).methods) {
       if (std::find(std::begin(kKnow), std::end(kKnow), report.method->name) != std::end(kKnow)) continue;

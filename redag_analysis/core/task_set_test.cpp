@@ -7,9 +7,9 @@
 #include <gtest/gtest.h>
 
 #include "redag_analysis/analyze/analyze.hpp"
+#include "redag_analysis/many_workers/dag_isolated.hpp"
 #include "redag_analysis/one_worker/edf_demand.hpp"
 #include "redag_analysis/one_worker/response_time.hpp"
-#include "redag_analysis/one_worker/utilization.hpp"
 #include "tests/testing/bound_property.hpp"
 #include "tests/testing/builders.hpp"
 
@@ -125,7 +125,7 @@ TEST(TaskSet, WhatCutsOrRefusesJobsIsNotAnalysed) {
   threads.max_started = 3;
   EXPECT_EQ(compiled(two_dags(), threads).not_analysable, "");
   EXPECT_TRUE(compiled(two_dags(), threads).threads_suffice_if_bounded);
-  EXPECT_THAT(refusal(hyperbolic_blocking(), two_dags(), threads), HasSubstr("fewer threads than tasks"));
+  EXPECT_THAT(refusal(isolated(), two_dags(), threads), HasSubstr("fewer threads than tasks"));
   threads.max_started = 4;
   EXPECT_FALSE(compiled(two_dags(), threads).threads_suffice_if_bounded);
   EXPECT_EQ(compiled(two_dags(), threads).not_analysable, "");
@@ -197,23 +197,6 @@ TEST(NotApplicable, GroupsInCooperativeMode) {
   workload.dags[0].tasks[1].region = kMillisecond;
   EXPECT_THAT(refusal(rta_deferred(), workload, mode(sched::Preemption::Cooperative)), HasSubstr("groups"));
   EXPECT_EQ(refusal(rta_nonpreemptive(), workload, mode(sched::Preemption::None)), "");
-}
-
-TEST(NotApplicable, UtilizationNeedsTheOrderByRate) {
-  Workload workload = make_workload({make_dag("d", {{.name = "a", .period = 5}, {.name = "b", .period = 50}})}, 1,
-                                    PreemptionMode::Os, PolicyKind::Fixed);
-  workload.dags[0].tasks[1].priority = 7;
-  const AnalysisPlatform full = mode(sched::Preemption::Full);
-  EXPECT_THAT(refusal(hyperbolic_blocking(), workload, full), HasSubstr("less urgent than a task of a larger period"));
-  workload.policy = PolicyKind::RateMonotonic;
-  EXPECT_EQ(refusal(hyperbolic_blocking(), workload, full), "");
-  EXPECT_EQ(refusal(hyperbolic_blocking(), workload, mode(sched::Preemption::None)), "");
-  workload.dags[0].tasks[0].jitter = 1;
-  EXPECT_THAT(refusal(hyperbolic_blocking(), workload, full), HasSubstr("jitter"));
-  workload.dags[0].tasks[0].jitter = 0;
-  workload.dags[0].tasks[0].deadline -= 1;
-  EXPECT_THAT(refusal(global_rm_utilization(), workload, mode(sched::Preemption::Full, 2)), HasSubstr("deadline"));
-  EXPECT_THAT(refusal(global_rm_utilization(), workload, full), HasSubstr("two workers"));
 }
 
 }  // namespace

@@ -161,7 +161,7 @@ ResponseBound explain(const TaskSet &task_set, std::span<const GlobalUnit> units
 }
 
 Outcome apply_shapes(const TaskSet &task_set) {
-  // Without edges no DAG has a shape; bertogna_cirinei() is then never above this bound, and quicker.
+  // Without edges no DAG has a shape; dag_bounded() is then never above this bound, and quicker.
   if (!task_set.has_edges()) return NotApplicable{"no task has predecessors: see the bounds for independent tasks"};
   global::Units view = global::units_of(task_set, {.equals = true});
   if (view.reason) return NotApplicable{*view.reason};

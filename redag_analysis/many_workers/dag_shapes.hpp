@@ -46,7 +46,7 @@ class Shape {
 }  // namespace global
 
 /// R_k = len_k + floor((vol_k - len_k + sum W_j(R_k)) / m), with W_j of Shape. After J. Fonseca, G. Nelissen, V. Nelis,
-/// RTNS 2017 and Real-Time Systems 55, 2019. Never above melani(). Proof: docs/analysis.md, "Shapes of DAGs".
+/// RTNS 2017 and Real-Time Systems 55, 2019. Proof: docs/analysis.md, "Shapes of DAGs".
 [[nodiscard]] Method dag_shapes();
 
 }  // namespace redag::analysis

@@ -175,33 +175,6 @@ TEST(Shape, WorkIsTheMostOverAllPlacements) {
   EXPECT_GT(single, 50U);
 }
 
-TEST(DagShapes, AreNeverAboveMelani) {
-  std::uint64_t smaller = 0;
-  std::uint64_t bounds = 0;
-  for_cases(cases(graphs()), 3000, [&](const testing::BoundCase &, const TaskSet &task_set, Rng &) {
-    if (is_across_rates(task_set)) return;  // it is analysed in parts, and a part without edges has no shape
-    const Outcome melanis = melani().apply(task_set);
-    const Outcome shapes = dag_shapes().apply(task_set);
-    ASSERT_EQ(std::holds_alternative<Bound>(shapes), std::holds_alternative<Bound>(melanis) && task_set.has_edges());
-    if (!std::holds_alternative<Bound>(shapes)) return;
-    const auto &dags = std::get<Bound>(melanis).dags;
-    const bool all_bounded = std::all_of(dags.begin(), dags.end(), [](const auto &dag) { return dag.response; });
-    for (std::size_t d = 0; d < task_set.dags.size(); ++d) {
-      const auto worse = dags[d].response;
-      const auto better = std::get<Bound>(shapes).dags[d].response;
-      if (!worse) continue;
-      // Below a DAG without a bound, only melani goes on.
-      ASSERT_TRUE(better || !all_bounded);
-      if (!better) continue;
-      ASSERT_LE(*better, *worse);
-      ++bounds;
-      if (*better < *worse) ++smaller;
-    }
-  });
-  EXPECT_GT(bounds, 1000U);
-  EXPECT_GT(smaller, 100U);
-}
-
 // Neither bound is always the smaller: dag_bounded() limits each DAG's work to its width while a path waits.
 TEST(DagShapes, AndWidthsAreIncomparable) {
   std::uint64_t smaller = 0;

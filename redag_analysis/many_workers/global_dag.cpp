@@ -87,21 +87,6 @@ class Window {
 
 }  // namespace
 
-bool melani_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers, Duration start) {
-  GlobalUnit &own = units[k];
-  if (is_hopeless(own, workers)) return false;
-  const auto more_urgent = units.first(k);
-  Duration window = std::max(start, own.length + (own.volume - own.length) / workers);
-  const bool found = least_fixed_point(own.limit - own.jitter, window, [&](Duration x) {
-    Effort::spend(more_urgent.size() + 1);
-    Duration sum = own.volume - own.length;
-    for (const GlobalUnit &other : more_urgent) sum += dag_work(other, x);
-    return own.length + sum / static_cast<Duration>(workers);
-  });
-  own.response = window + own.jitter;
-  return found;
-}
-
 bool bounded_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers, Duration blocking,
                       Waiting &waiting, Duration start) {
   GlobalUnit &own = units[k];
@@ -157,23 +142,6 @@ Bound from_most_urgent(const TaskSet &task_set, global::Units &view, Respond res
         return bound;
       },
       global::narrows_to_part(task_set), true);
-}
-
-Outcome apply_melani(const TaskSet &task_set) {
-  global::Units view = global::units_of(task_set, {.equals = true});
-  if (view.reason) return NotApplicable{*view.reason};
-  for (GlobalUnit &unit : view.units) global::set_width(unit, view.workers);
-  const std::span<GlobalUnit> units(view.units);
-  const std::uint32_t m = view.workers;
-  return from_most_urgent(
-      task_set, view, [&](std::size_t k, Duration start) { return global::melani_response(units, k, m, start); },
-      [&](std::size_t k, SharedTerms &terms) {
-        const GlobalUnit &own = units[k];
-        terms.add_share(Term::Kind::Own, own, own.volume - own.length, m);
-        for (const GlobalUnit &other : units.first(k)) {
-          terms.add_share(Term::Kind::Interference, other, global::dag_work(other, own.response - own.jitter), m);
-        }
-      });
 }
 
 // Adds shares of `waiting.busy` or, with max_active, of the sum that made the response. The tightening is taken from
@@ -273,27 +241,14 @@ Outcome apply_dag_nonpreemptive(const TaskSet &task_set) { return apply_bounded(
 
 }  // namespace
 
-Method melani() {
-  return Method{
-      .name = "melani",
-      .subject = Subject::Dag,
-      .cite =
-          "A. Melani, M. Bertogna, V. Bonifaci, A. Marchetti-Spaccamela, G. Buttazzo, Response-time analysis of "
-          "conditional DAG tasks in multiprocessor systems, ECRTS 2015",
-      .assumptions =
-          "m workers, full preemption, static priorities that keep DAGs together, R <= T; release jitter, shared "
-          "levels; "
-          "no max_active, no shared groups",
-      .complexity = "pseudo-polynomial; O(DAGs) per step",
-      .apply = [](const TaskSet &task_set) { return across_rates(task_set, apply_melani); },
-  };
-}
-
 Method dag_bounded() {
   return Method{
       .name = "dag_bounded",
       .subject = Subject::Dag,
-      .cite = "docs/analysis.md, \"Several workers\"; after A. Melani et al., ECRTS 2015",
+      .cite =
+          "docs/analysis.md, \"Several workers\"; after A. Melani, M. Bertogna, V. Bonifaci, A. Marchetti-Spaccamela, "
+          "G. "
+          "Buttazzo, ECRTS 2015; of independent tasks: M. Bertogna, M. Cirinei, RTSS 2007",
       .assumptions =
           "m workers, full preemption, static priorities that keep DAGs together, one rate per DAG, R <= T; release "
           "jitter, shared levels, max_active of DAGs in one part; no shared groups",

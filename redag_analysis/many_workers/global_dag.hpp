@@ -24,11 +24,6 @@ namespace global {
   return jobs.quotient * dag.volume + std::min(dag.volume, jobs.remainder);
 }
 
-/// Sets `response` of units[k], given those of units[0 .. k): R = L + floor((vol - L + sum W_j(R)) / m). Returns false
-/// above its limit, or after too many steps. Below `start` there is no fixed point.
-[[nodiscard]] bool melani_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers,
-                                   Duration start = 0);
-
 /// How a DAG's critical path waits under dag_bounded().
 struct Waiting {
   Duration window = 0;          // from its first job's release as seen to its finish
@@ -36,8 +31,9 @@ struct Waiting {
   std::vector<Duration> works;  // of the more urgent DAGs, by position; scratch of the fixed point
 };
 
-/// The same with max_active and with `blocking` by less urgent work. Each DAG counts only with what its width lets it
-/// do while the critical path waits. `waiting.works` must hold k values.
+/// Sets `response` of units[k], given those of units[0 .. k), with max_active and with `blocking` by less urgent work.
+/// Each DAG counts only with what its width lets it do while the critical path waits. Returns false above its limit, or
+/// after too many steps. Below `start` there is no fixed point. `waiting.works` must hold k values.
 [[nodiscard]] bool bounded_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers,
                                     Duration blocking, Waiting &waiting, Duration start = 0);
 
@@ -49,12 +45,9 @@ struct Waiting {
 
 }  // namespace global
 
-/// Full preemption, no max_active. A. Melani, M. Bertogna, V. Bonifaci, A. Marchetti-Spaccamela, G. Buttazzo, ECRTS
-/// 2015; IEEE TC 66(2), 2017 (without conditional nodes).
-[[nodiscard]] Method melani();
-
-/// Full preemption, max_active or not: R = L + floor((vol - L) / c + sum W_j(R) / m) with refinements. Never above
-/// melani() where both apply. Proof: docs/analysis.md, "Several workers".
+/// Full preemption, max_active or not: R = L + floor((vol - L) / c + sum W_j(R) / m) with refinements; after A.
+/// Melani, M. Bertogna, V. Bonifaci, A. Marchetti-Spaccamela, G. Buttazzo, ECRTS 2015. For independent tasks it is the
+/// bound of M. Bertogna, M. Cirinei, RTSS 2007. Proof: docs/analysis.md, "Several workers".
 [[nodiscard]] Method dag_bounded();
 
 /// Jobs run to completion, max_active or not: dag_bounded() with blocking. A safe form of the limited-preemption bound

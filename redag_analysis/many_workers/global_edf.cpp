@@ -195,7 +195,6 @@ Method edf_global_density() {
           "m workers, full preemption, edf, no edges, D <= T and no jobs skipped before it, jitter below the deadline; "
           "no shared groups, no max_active",
       .complexity = "O(n)",
-      .quick = true,
       .apply = apply_density,
   };
 }

@@ -7,7 +7,7 @@
 
 #include <initializer_list>
 
-#include "redag_analysis/many_workers/global_sequential.hpp"
+#include "redag_analysis/many_workers/global_dag.hpp"
 #include "redag_analysis/one_worker/edf_demand.hpp"
 #include "tests/testing/bound_property.hpp"
 #include "tests/testing/builders.hpp"
@@ -99,7 +99,7 @@ TEST(EdfGlobalDensity, LeavesRoomForTheLargest) {
 TEST(EdfGlobalResponse, CountsWhatIsDueInTime) {
   const TaskSet task_set = edf_task_set(1, {{2, 5}, {2, 5}}, sched::Preemption::Full);
   EXPECT_EQ(responses(edf_global_response(), task_set), (Responses{4, 4}));
-  EXPECT_EQ(responses(bertogna_cirinei_any(), task_set), (Responses{std::nullopt, std::nullopt}));
+  EXPECT_EQ(responses(dag_any(), task_set), (Responses{std::nullopt, std::nullopt}));
 }
 
 // The short task waits for 19 of the long one, which waits for one job of the short one.
@@ -127,7 +127,7 @@ TEST(EdfGlobalResponse, IsNeverAboveThatForAnyOrder) {
     limits.min_utilization = 0.1;
     limits.max_utilization = 0.6;
     for_cases(cases(limits), 2000, [&](const testing::BoundCase &, const TaskSet &task_set, Rng &) {
-      const Outcome any = bertogna_cirinei_any().apply(task_set);
+      const Outcome any = dag_any().apply(task_set);
       const Outcome edf = edf_global_response().apply(task_set);
       if (!std::holds_alternative<Bound>(any)) return;
       for (std::size_t t = 0; t < task_set.tasks.size(); ++t) {

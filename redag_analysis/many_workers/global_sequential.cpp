@@ -146,29 +146,23 @@ Duration guan_window(std::span<GlobalUnit> more_urgent, Duration x, Duration d, 
   return sum.next(more_urgent, workers);
 }
 
-// least_window() with `rest` and the sequential_work() of all units but `skip`.
-Duration carrying_window(std::span<GlobalUnit> others, std::size_t skip, Duration x, Duration d, Duration rest,
-                         std::uint32_t workers) {
+// least_window() with `rest` and the sequential_work() of all units in windows of length d.
+Duration carrying_window(std::span<GlobalUnit> others, Duration d, Duration rest, std::uint32_t workers) {
   Effort::spend(others.size() + 1);
   Largest largest(workers - 1);
   Duration sum = rest;
-  for (std::size_t i = 0; i < others.size(); ++i) {
-    if (i == skip) continue;
-    others[i].work = sequential_work(others[i], x);
-    sum += others[i].work;
-    if (others[i].work >= d) largest.offer(others[i].work);
+  for (GlobalUnit &other : others) {
+    other.work = sequential_work(other, d);
+    sum += other.work;
+    if (other.work >= d) largest.offer(other.work);
   }
   return least_window(sum, largest.entries(), workers);
 }
 
-constexpr std::size_t kNobody = SIZE_MAX;
-
 // The length from which to search: each other executes for at least min(C, d) in a window of d or more.
-Duration first_window(std::span<const GlobalUnit> others, std::size_t skip, Duration rest, std::uint32_t workers) {
+Duration first_window(std::span<const GlobalUnit> others, Duration rest, std::uint32_t workers) {
   FirstWindow first(workers, rest);
-  for (std::size_t i = 0; i < others.size(); ++i) {
-    if (i != skip) first.add(others[i].volume);
-  }
+  for (const GlobalUnit &other : others) first.add(other.volume);
   return first.length();
 }
 
@@ -184,22 +178,12 @@ Duration start_after(std::span<const GlobalUnit> units, std::size_t k) {
   return start;
 }
 
-bool bertogna_cirinei_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers, Duration start) {
-  GlobalUnit &own = units[k];
-  Duration d = std::max(start, first_window(units.first(k), kNobody, 0, workers));
-  const bool found = least_fixed_point(own.limit - own.jitter - own.volume + 1, d, [&](Duration waiting) {
-    return carrying_window(units.first(k), kNobody, waiting + own.volume - 1, waiting, 0, workers);
-  });
-  own.response = d - 1 + own.volume + own.jitter;
-  return found;
-}
-
 bool guan_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers, Duration start) {
   GlobalUnit &own = units[k];
   const Duration stop = own.limit - own.jitter - own.volume + 1;
   const auto window = [&](Duration d) { return d + own.volume - 1; };
   for (GlobalUnit &other : units.first(k)) forget_jobs(other);
-  Duration d = std::max(start, first_window(units.first(k), kNobody, 0, workers));
+  Duration d = std::max(start, first_window(units.first(k), 0, workers));
   const bool found =
       least_fixed_point(stop, d, [&](Duration w) { return guan_window(units.first(k), window(w), w, workers); });
   own.response = window(d) + own.jitter;
@@ -212,21 +196,11 @@ bool sequential_nonpreemptive_response(std::span<GlobalUnit> units, std::size_t 
                                        Duration remaining, Duration start) {
   GlobalUnit &own = units[k];
   if (remaining >= kUnbounded / 4) return false;
-  Duration d = std::max(start, first_window(units.first(k), kNobody, remaining, workers));
+  Duration d = std::max(start, first_window(units.first(k), remaining, workers));
   const bool found = least_fixed_point(own.limit - own.jitter - own.volume + 1, d, [&](Duration waiting) {
-    return carrying_window(units.first(k), kNobody, waiting, waiting, remaining, workers);
+    return carrying_window(units.first(k), waiting, remaining, workers);
   });
   own.response = d - 1 + own.volume + own.jitter;
-  return found;
-}
-
-bool any_order_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers) {
-  GlobalUnit &own = units[k];
-  Duration d = first_window(units, k, 0, workers);
-  const bool found = least_fixed_point(own.limit - own.jitter - own.volume + 1, d, [&](Duration waiting) {
-    return carrying_window(units, k, waiting + own.volume - 1, waiting, 0, workers);
-  });
-  if (found) own.response = std::min(own.response, d - 1 + own.volume + own.jitter);
   return found;
 }
 
@@ -276,14 +250,6 @@ Outcome from_most_urgent(const TaskSet &task_set, const global::Needs &needs, Re
       [&](std::size_t k) { return itemise(task_set, view.units, k, view.workers, remaining); });
 }
 
-Outcome apply_bertogna_cirinei(const TaskSet &task_set) {
-  return from_most_urgent(
-      task_set, {.edges = false, .equals = true}, [](global::Units &view, std::size_t k, bool alone, Duration &) {
-        const Duration start = alone ? global::start_after(view.units, k) : global::start_again(view.units[k]);
-        return global::bertogna_cirinei_response(view.units, k, view.workers, start);
-      });
-}
-
 // An earlier job of the task itself can keep a worker from its equals, and more of them then carry work in. Therefore
 // guan() takes no equals.
 Outcome apply_guan(const TaskSet &task_set) {
@@ -302,74 +268,7 @@ Outcome apply_sequential_nonpreemptive(const TaskSet &task_set) {
                           });
 }
 
-ResponseBound any_order_bound(const TaskSet &task_set, const GlobalUnit &unit) {
-  ResponseBound bound;
-  bound.response = unit.response;
-  SharedTerms terms(task_set, unit);
-  terms.add_path();
-  terms.add_jitter();
-  bound.terms = terms.take();
-  const Duration others = unit.response - unit.jitter - unit.volume;
-  if (others > 0 && terms.wanted()) bound.terms.push_back(Term{Term::Kind::Interference, TaskId(), DagId(), others, 0});
-  return bound;
-}
-
-Outcome apply_sequential(const TaskSet &task_set) {
-  // A job waits only while all workers execute others, whether those can be preempted or not.
-  const auto mode = task_set.mode == sched::Preemption::None ? sched::Preemption::None : sched::Preemption::Full;
-  global::Units view = global::units_of(task_set, {.mode = mode, .edges = false, .any_policy = true});
-  if (view.reason) return NotApplicable{*view.reason};
-  // At first every task is assumed to keep its limit. If the first round confirms this for all, it holds, and each
-  // further round may rely on the last one. The first job ever to break a bound would have to come after another such
-  // job.
-  for (GlobalUnit &unit : view.units) unit.response = unit.limit;
-  constexpr int kRounds = 50;
-  bool possible = !global::is_any_hopeless(view.units, view.workers);
-  bool changed = possible;
-  for (int round = 0; round < kRounds && changed; ++round) {
-    changed = false;
-    for (std::size_t k = 0; k < view.units.size() && possible; ++k) {
-      const Duration before = view.units[k].response;
-      possible = global::any_order_response(view.units, k, view.workers);
-      changed = changed || view.units[k].response < before;
-    }
-  }
-  if (!possible) {
-    ResponseBound none;
-    none.absent = "a task's response time can reach its next release, and then no other bound holds";
-    return from_units(task_set, std::vector<ResponseBound>(task_set.units.size(), none));
-  }
-  std::vector<ResponseBound> responses(task_set.units.size());
-  for (const GlobalUnit &unit : view.units) responses[unit.unit] = any_order_bound(task_set, unit);
-  return from_units(task_set, std::move(responses));
-}
-
 }  // namespace
-
-Method bertogna_cirinei() {
-  return Method{
-      .name = "bertogna_cirinei",
-      .cite =
-          "M. Bertogna, M. Cirinei, Response-time analysis for globally scheduled symmetric multiprocessor platforms, "
-          "RTSS 2007",
-      .assumptions =
-          "m workers, full preemption, static priorities, no edges, R <= T; release jitter, shared levels; no shared "
-          "groups",
-      .complexity = "pseudo-polynomial; O(n) per step",
-      .apply = [](const TaskSet &task_set) { return across_rates(task_set, apply_bertogna_cirinei); },
-  };
-}
-
-Method bertogna_cirinei_any() {
-  Method method = bertogna_cirinei();
-  method.name = "bertogna_cirinei_any";
-  method.assumptions =
-      "m workers, full preemption or none, any work-conserving order (EDF, FIFO too), no edges, R <= T for all tasks; "
-      "release jitter, shared levels; no shared groups";
-  method.complexity = "pseudo-polynomial; O(n^2) per step, at most 50 rounds";
-  method.apply = apply_sequential;
-  return method;
-}
 
 Method guan() {
   return Method{

@@ -21,31 +21,20 @@ namespace global {
   return jobs.quotient * task.volume + std::min(task.volume, jobs.remainder);
 }
 
-/// Where the two bounds for full preemption may begin for units[k], if the same bound gave the responses of all units
-/// before it. What delays a more urgent task also delays this one. The window is no shorter if the other task's wcet is
-/// no longer.
+/// Where guan_response() may begin for units[k], if it gave the responses of all units before it. What delays a more
+/// urgent task also delays this one. The window is no shorter if the other task's wcet is no longer.
 [[nodiscard]] Duration start_after(std::span<const GlobalUnit> units, std::size_t k);
 
 /// Each of these sets `response` of units[k], given those of the more urgent units[0 .. k). Returns false above its
 /// limit, or after too many steps. Below `start` there is no fixed point.
-[[nodiscard]] bool bertogna_cirinei_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers,
-                                             Duration start = 0);
 [[nodiscard]] bool guan_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers, Duration start = 0);
 /// `remaining` is the sum of the m largest C - 1 of less urgent tasks.
 [[nodiscard]] bool sequential_nonpreemptive_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers,
                                                      Duration remaining, Duration start = 0);
 /// Where the next fixed point of the unit may begin when others have larger responses: at its last one.
 [[nodiscard]] Duration start_again(const GlobalUnit &unit);
-/// Lowers `response` of units[k], given those of all others, for any work-conserving order.
-[[nodiscard]] bool any_order_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t workers);
 
 }  // namespace global
-
-/// R = C + floor(sum min(W_i(R), R - C + 1) / m) over more urgent tasks. M. Bertogna, M. Cirinei, RTSS 2007.
-[[nodiscard]] Method bertogna_cirinei();
-
-/// The same over all other tasks, for any work-conserving order (EDF, FIFO), with slack iteration. Ibid.
-[[nodiscard]] Method bertogna_cirinei_any();
 
 /// At most m - 1 tasks carry work into the window. N. Guan, M. Stigge, W. Yi, G. Yu, RTSS 2009. Only for R <= T: its
 /// extension to arbitrary deadlines is not safe (J. Huang, J.-J. Chen, RTNS 2015).

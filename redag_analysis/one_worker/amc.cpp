@@ -15,7 +15,6 @@ namespace {
 using one_worker::FixedPoint;
 using one_worker::Interferer;
 using one_worker::Own;
-using one_worker::View;
 
 constexpr std::string_view kOnlyInLowMode = "HI mode degrades this DAG: it is bounded in LO mode only";
 
@@ -84,11 +83,11 @@ Others others_of(const TaskSet &task_set, const std::vector<std::uint32_t> &more
 }
 
 // Lists the terms of the bound across the change. Lower criticality interferes only until HI mode begins.
-std::vector<Term> terms_of(const TaskSet &task_set, const Unit &unit, const View &view, const Others &others,
-                           Duration low_window, Duration window) {
+std::vector<Term> terms_of(const TaskSet &task_set, const Unit &unit, const std::vector<one_worker::Blocker> &blockers,
+                           const Others &others, Duration low_window, Duration window) {
   const TaskId self = unit.tasks.size() == 1 ? TaskId(unit.tasks.front()) : TaskId();
   std::vector<Term> terms = {Term{Term::Kind::Own, self, unit.dag, unit.volume, 1}};
-  for (const one_worker::Blocker &blocker : view.blockers) {
+  for (const one_worker::Blocker &blocker : blockers) {
     const TaskId task(blocker.task);
     terms.push_back(Term{Term::Kind::Blocking, task, task_set.tasks[blocker.task].dag, blocker.amount, 1});
   }
@@ -105,23 +104,25 @@ std::vector<Term> terms_of(const TaskSet &task_set, const Unit &unit, const View
 
 // HI mode begins at most R(LO) after the start of a busy period in which the unit has a job; in LO mode the period
 // would be over by then. Lower criticality thus contributes only the releases within R(LO).
-void bound_unit(const TaskSet &task_set, one_worker::Views &views, std::uint32_t u, ResponseBound &bound,
+void bound_unit(const TaskSet &task_set, const one_worker::Views &views, std::uint32_t u, ResponseBound &bound,
                 ModeResponses &modes) {
   const Unit &unit = task_set.units[u];
-  const View view = views.of(u);
+  const std::vector<one_worker::Blocker> blockers = views.blockers(u);
+  Duration blocking = 0;
+  for (const one_worker::Blocker &blocker : blockers) blocking = add(blocking, blocker.amount);
   const Others others = others_of(task_set, views.more_urgent(u));
 
   const FixedPoint low =
-      one_worker::preemptive_response(own_of(unit, low_volume(task_set, unit), view.blocking), others.low);
+      one_worker::preemptive_response(own_of(unit, low_volume(task_set, unit), blocking), others.low);
   bound.absent = task_set.dags[unit.dag.value].high ? low.absent : kOnlyInLowMode;
   if (!low.found) return;
   modes.low = low.found->response;
   if (!task_set.dags[unit.dag.value].high) return;
 
-  const FixedPoint high = one_worker::preemptive_response(own_of(unit, unit.volume, view.blocking), others.high);
+  const FixedPoint high = one_worker::preemptive_response(own_of(unit, unit.volume, blocking), others.high);
   if (high.found) modes.high = high.found->response;
 
-  Duration before_change = view.blocking;
+  Duration before_change = blocking;
   for (std::size_t i = 0; i < others.units.size(); ++i) {
     const Unit &other = task_set.units[others.units[i]];
     if (!is_stopped(task_set, other)) continue;
@@ -134,7 +135,7 @@ void bound_unit(const TaskSet &task_set, one_worker::Views &views, std::uint32_t
   modes.change = change.found->response;
   bound.response = change.found->response;
   if (Effort::itemises(u))
-    bound.terms = terms_of(task_set, unit, view, others, low.found->window, change.found->window);
+    bound.terms = terms_of(task_set, unit, blockers, others, low.found->window, change.found->window);
 }
 
 Outcome apply_amc(const TaskSet &task_set) {
@@ -143,7 +144,7 @@ Outcome apply_amc(const TaskSet &task_set) {
   std::vector<ModeResponses> modes(task_set.units.size());
   bool low_is_met = true;
   bool high_is_met = true;
-  one_worker::Views views(task_set);
+  const one_worker::Views views(task_set);
   for (std::uint32_t u = 0; u < units.size(); ++u) {
     bound_unit(task_set, views, u, units[u], modes[u]);
     const Duration deadline = std::min(task_set.units[u].deadline, task_set.units[u].limit);

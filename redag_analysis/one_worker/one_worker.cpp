@@ -79,22 +79,9 @@ std::optional<std::string> why_not(const TaskSet &task_set) {
   return std::nullopt;
 }
 
-Views::Views(const TaskSet &task_set) : task_set_(task_set), by_first_rank_(task_set.units.size()) {
-  std::iota(by_first_rank_.begin(), by_first_rank_.end(), 0);
-  std::sort(by_first_rank_.begin(), by_first_rank_.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return task_set.units[a].first_rank < task_set.units[b].first_rank;
-  });
+Views::Views(const TaskSet &task_set) : task_set_(task_set) {
   close_levels();
-  order_ = by_first_rank_;
-  std::stable_sort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) { return level(a) < level(b); });
   find_longest();
-  std::map<std::pair<Duration, Duration>, std::uint32_t> known;
-  for (const Unit &unit : task_set.units) {
-    const auto next = static_cast<std::uint32_t>(classes_.size());
-    const auto [found, is_new] = known.emplace(std::pair(unit.period, unit.jitter), next);
-    if (is_new) classes_.push_back({unit.period, unit.jitter, 0});
-    class_of_.push_back(found->second);
-  }
 }
 
 void Views::close_levels() {
@@ -121,18 +108,12 @@ void Views::find_longest() {
   }
 }
 
-std::span<const std::uint32_t> Views::down_to(std::uint32_t level) const {
-  const auto end = std::partition_point(by_first_rank_.begin(), by_first_rank_.end(),
-                                        [&](std::uint32_t u) { return task_set_.units[u].first_rank <= level; });
-  return {by_first_rank_.begin(), end};
-}
-
 std::vector<std::uint32_t> Views::more_urgent(std::uint32_t unit) const {
-  const std::span<const std::uint32_t> above = down_to(level(unit));
-  std::vector<std::uint32_t> units(above.begin(), above.end());
-  units.erase(std::find(units.begin(), units.end(), unit));
-  std::sort(units.begin(), units.end());
-  return units;
+  std::vector<std::uint32_t> found;
+  for (std::uint32_t u = 0; u < task_set_.units.size(); ++u) {
+    if (u != unit && task_set_.units[u].first_rank <= level(unit)) found.push_back(u);
+  }
+  return found;
 }
 
 // Less urgent jobs that delay the level: they were started before the busy period and cannot be preempted. "- 1": they
@@ -172,36 +153,6 @@ std::vector<Blocker> Views::blockers(std::uint32_t unit) const {
   }
   if (longest.amount > 0) found.push_back(longest);
   return found;
-}
-
-Duration Views::blocking(std::uint32_t unit) const {
-  Duration sum = 0;
-  for (const Blocker &blocker : blockers(unit)) sum = add(sum, blocker.amount);
-  return sum;
-}
-
-void Views::count_down_to(std::uint32_t level) {
-  const std::size_t wanted = down_to(level).size();
-  const auto change = [&](std::size_t i, Int128 sign) {
-    const std::uint32_t u = by_first_rank_[i];
-    classes_[class_of_[u]].wcet += sign * task_set_.units[u].volume;
-  };
-  for (; counted_ < wanted; ++counted_) change(counted_, 1);
-  for (; counted_ > wanted; --counted_) change(counted_ - 1, -1);
-}
-
-View Views::of(std::uint32_t unit) {
-  const std::uint32_t last = level(unit);
-  View view;
-  count_down_to(last);
-  for (std::uint32_t c = 0; c < classes_.size(); ++c) {
-    const Class &one = classes_[c];
-    const Int128 wcet = one.wcet - (c == class_of_[unit] ? task_set_.units[unit].volume : 0);
-    if (wcet > 0) view.more_urgent.push_back(Interferer{saturate(wcet), one.period, one.jitter});
-  }
-  view.blockers = blockers(unit);
-  for (const Blocker &blocker : view.blockers) view.blocking = add(view.blocking, blocker.amount);
-  return view;
 }
 
 FixedPoint no_fixed_point(int steps) {

@@ -33,55 +33,28 @@ struct Blocker {
   Duration amount = 0;
 };
 
-/// One unit's view of the task set.
-struct View {
-  std::vector<Interferer> more_urgent;  // those of one period and jitter are combined into one
-  std::vector<Blocker> blockers;        // each at most once in a busy period
-  Duration blocking = 0;                // their sum
-};
-
 /// The units that can delay each unit. The level of the busy period is the least urgent task of the unit, lowered until
 /// no tier and no other unit lies on both sides of it (docs/analysis.md, "One worker"). Memory is linear in the size of
 /// the task set.
 class Views {
  public:
-  /// `task_set` must outlive this object. O(n log n).
+  /// `task_set` must outlive this object. O(n).
   explicit Views(const TaskSet &task_set);
 
-  /// Units from the most urgent level to the least; of() is cheap in this order.
-  [[nodiscard]] const std::vector<std::uint32_t> &order() const { return order_; }
-  /// The level of the busy period as a rank: all work of this rank and above belongs to whole units.
-  [[nodiscard]] std::uint32_t level(std::uint32_t unit) const { return closed_[task_set_.units[unit].last_rank]; }
-  /// Units with a task of this rank or above, including `unit`, most urgent first.
-  [[nodiscard]] std::span<const std::uint32_t> down_to(std::uint32_t level) const;
   /// The units that can interfere, in the order of TaskSet::units.
   [[nodiscard]] std::vector<std::uint32_t> more_urgent(std::uint32_t unit) const;
-  /// The blockers, each with its amount. O(members of groups).
+  /// The blockers, each at most once in a busy period, with its amount. O(members of groups).
   [[nodiscard]] std::vector<Blocker> blockers(std::uint32_t unit) const;
-  [[nodiscard]] Duration blocking(std::uint32_t unit) const;
-  /// Returns a unit's view. O(different periods), plus the step from the unit of the previous call.
-  [[nodiscard]] View of(std::uint32_t unit);
 
  private:
-  // The units of one period and jitter.
-  struct Class {
-    Duration period = 0;
-    Duration jitter = 0;
-    Int128 wcet = 0;  // of those that counted_ includes
-  };
-
-  void count_down_to(std::uint32_t level);
+  // The level of the busy period as a rank: all work of this rank and above belongs to whole units.
+  [[nodiscard]] std::uint32_t level(std::uint32_t unit) const { return closed_[task_set_.units[unit].last_rank]; }
   void close_levels();
   void find_longest();
 
   const TaskSet &task_set_;
-  std::vector<std::uint32_t> by_first_rank_;  // units
-  std::vector<std::uint32_t> order_;
   std::vector<std::uint32_t> closed_;  // by rank: the first level at or below it that splits no unit and no tier
   std::vector<Blocker> longest_;       // by rank: the longest stretch at or below it that nothing preempts
-  std::vector<Class> classes_;
-  std::vector<std::uint32_t> class_of_;  // by unit
-  std::size_t counted_ = 0;              // this many units of by_first_rank_ are in classes_
 };
 
 /// A task in its busy period.

@@ -8,17 +8,24 @@
 #include <cstdio>
 #include <map>
 #include <span>
+#include <utility>
 
 #include "redag_analysis/core/arithmetic.hpp"
 #include "redag_analysis/core/effort.hpp"
-#include "redag_analysis/core/exact_utilization.hpp"
 #include "redag_analysis/one_worker/one_worker.hpp"
-#include "redag_analysis/one_worker/utilization.hpp"
 
 namespace redag::analysis {
 namespace {
 
 constexpr int kMaxIterations = 1'000'000;
+
+bool can_block(const TaskSet &task_set) {
+  const one_worker::Views views(task_set);
+  for (std::uint32_t u = 0; u < task_set.units.size(); ++u) {
+    if (!views.blockers(u).empty()) return true;
+  }
+  return false;
+}
 
 // Returns the first assumption of the paper's equations that does not hold here; empty if all hold.
 std::string broken_assumption(const TaskSet &task_set, bool with_blocking) {
@@ -37,11 +44,7 @@ std::string broken_assumption(const TaskSet &task_set, bool with_blocking) {
   }
   if (with_blocking) return {};
   if (task_set.mode != sched::Preemption::Full) return "less urgent callbacks are not preempted at once";
-  const one_worker::Views views(task_set);
-  for (std::uint32_t u = 0; u < task_set.units.size(); ++u) {
-    if (views.blocking(u) > 0) return "less urgent callbacks can block";
-  }
-  return {};
+  return can_block(task_set) ? "less urgent callbacks can block" : "";
 }
 
 // hp(i) of the paper: the tasks with strictly smaller periods.
@@ -128,13 +131,76 @@ void fill_dags(const TaskSet &task_set, Bound &bound) {
   }
 }
 
+// Returns the units from the most urgent to the least; empty if their priorities are interleaved.
+std::optional<std::vector<std::uint32_t>> units_by_rank(const TaskSet &task_set) {
+  std::vector<std::uint32_t> order;
+  std::uint32_t end = 0;  // the ranks below it are covered by whole units
+  for (const std::uint32_t t : task_set.by_rank) {
+    const std::uint32_t u = task_set.tasks[t].unit;
+    if (task_set.units[u].first_rank != task_set.tasks[t].rank) continue;
+    if (task_set.units[u].first_rank < end) return std::nullopt;
+    end = task_set.units[u].last_rank + 1;
+    order.push_back(u);
+  }
+  return order;
+}
+
+// True if the units share a tier: each can go before the other.
+bool take_turns(const TaskSet &task_set, const Unit &upper, const Unit &lower) {
+  return task_set.tasks[task_set.by_rank[upper.last_rank]].tier ==
+         task_set.tasks[task_set.by_rank[lower.first_rank]].tier;
+}
+
+// Returns why a test by utilizations does not apply: jitter, deadlines below the period, or another order than by rate.
+// Equals of one period are allowed. Whichever goes first, each waits for no more than the last one in a fixed order
+// does.
+std::optional<std::string> why_not_by_rate(const TaskSet &task_set, const std::vector<std::uint32_t> &order) {
+  Duration last = 0;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const Unit &unit = task_set.units[order[i]];
+    const std::string name = unit.tasks.size() == 1 ? "task '" + task_set.tasks[unit.tasks.front()].name + "'"
+                                                    : "DAG '" + task_set.dags[unit.dag.value].name + "'";
+    if (i > 0 && unit.period != last && take_turns(task_set, task_set.units[order[i - 1]], unit)) {
+      return name + ": it has the same priority as a task of another period";
+    }
+    if (unit.deadline < unit.period) return name + ": its deadline is below its period";
+    if (unit.jitter > 0) return name + ": it has release jitter";
+    if (unit.period < last) return name + ": it is less urgent than a task of a larger period";
+    last = unit.period;
+  }
+  return std::nullopt;
+}
+
+// Returns why Liu and Layland's limit says nothing about the task set; empty if it is a sound test. C. Liu, J. Layland,
+// Journal of the ACM 20(1), 1973: one worker, full preemption, rate-monotonic order, D >= T, no jitter, no blocking.
+std::optional<std::string> why_not_liu_layland(const TaskSet &task_set) {
+  if (auto reason = one_worker::why_not(task_set)) return reason;
+  const auto order = units_by_rank(task_set);
+  if (!order) return "in the order of priorities, tasks of other DAGs stand between those of one DAG";
+  if (auto reason = why_not_by_rate(task_set, *order)) return reason;
+  if (task_set.mode != sched::Preemption::Full) return "requires full preemption";
+  if (can_block(task_set)) return "less urgent jobs can block (groups or shared levels)";
+  return std::nullopt;
+}
+
+// True if the sum of C / T is at most the limit. For one task both are compared as whole numbers. The limit of several
+// is irrational, and rounding refuses a sum within 2^-50 of it.
+bool is_within_liu_layland(const TaskSet &task_set) {
+  const std::vector<CompiledTask> &tasks = task_set.tasks;
+  if (tasks.size() == 1) return tasks.front().wcet <= tasks.front().period;
+  long double sum = 0;
+  for (const CompiledTask &task : tasks) {
+    sum += static_cast<long double>(task.wcet) / static_cast<long double>(task.period);
+  }
+  const auto n = static_cast<long double>(tasks.size());
+  return !tasks.empty() && sum + std::ldexp(1.0L, -50) <= n * std::expm1(std::log(2.0L) / n);
+}
+
 Outcome apply_rm_bound(const TaskSet &task_set) {
   Bound bound;
   const auto n = static_cast<double>(task_set.tasks.size());
   const double limit = n * std::expm1(std::log(2.0) / n);
-  Shares shares;
-  for (const CompiledTask &task : task_set.tasks) shares.push({static_cast<Uint128>(task.wcet), task.period});
-  bound.accepts = shares.size() > 0 && is_within_liu_layland(shares, shares.size());
+  bound.accepts = is_within_liu_layland(task_set);
   char text[96];
   std::snprintf(text, sizeof text, "U = %.4f, limit %.4f for %zu callbacks", task_set.utilization, limit,
                 task_set.tasks.size());

@@ -19,10 +19,9 @@
 namespace redag::analysis {
 namespace {
 
-// From a task's arrival to its finish: C, the shares of others, and what its own earlier jobs add (or take away).
+// From a task's arrival to its finish: C, and the shares of others.
 struct FromReady {
   Duration response = 0;
-  Duration earlier = 0;
   std::vector<Duration> shares;  // of the response, by TaskId
 };
 
@@ -33,10 +32,6 @@ struct Callback {
   Duration response = 0;  // R, from arrival to finish
   std::size_t place = 0;  // in the order of registration
 };
-
-Duration arrivals(const Callback &callback, Duration length) {
-  return length <= 0 ? 0 : ceil_div(add(length, callback.ready), callback.period);
-}
 
 // All callbacks of an executor, with what is known of them so far. Responses only grow.
 class Executor {
@@ -122,12 +117,10 @@ class Executor {
     if (!Effort::itemises(static_cast<std::uint32_t>(&unit - task_set_.units.data()))) return bound;
     std::map<std::size_t, Duration> shares;
     Duration own = 0;
-    Duration earlier = 0;
     Duration jitter = 0;
     for (bool more = true; more;) {
       const auto found = respond_(callbacks_, at, limit_of(unit) - callbacks_[at].ready);
       own += callbacks_[at].wcet;
-      earlier += found->earlier;
       for (std::size_t j = 0; j < found->shares.size(); ++j) {
         if (found->shares[j] != 0) shares[j] += found->shares[j];
       }
@@ -142,7 +135,6 @@ class Executor {
       }
     }
     bound.terms.push_back(Term{Term::Kind::Own, TaskId(), unit.dag, own, 1});
-    if (earlier != 0) bound.terms.push_back(Term{Term::Kind::Earlier, TaskId(), unit.dag, earlier, 0});
     for (const auto &[j, amount] : shares) {
       bound.terms.push_back(Term{Term::Kind::Interference, TaskId(j), task_set_.tasks[j].dag, amount, 0});
     }
@@ -186,30 +178,6 @@ Duration before(const std::vector<Callback> &callbacks, std::size_t j, std::size
   return callbacks[j].place < callbacks[i].place ? 1 : 0;
 }
 
-std::optional<FromReady> blass_response(const std::vector<Callback> &callbacks, std::size_t i, Duration limit) {
-  const Callback &own = callbacks[i];
-  const Duration polls = arrivals(own, own.response);
-  FromReady found;
-  found.shares.resize(callbacks.size());
-  Duration window = 1;
-  const bool ends = global::least_fixed_point(limit, window, [&](Duration length) {
-    Effort::spend(callbacks.size());
-    found.earlier = multiply(arrivals(own, length + own.response - 1) - 1, own.wcet);
-    Duration sum = found.earlier;
-    for (std::size_t j = 0; j < callbacks.size(); ++j) {
-      if (j == i) continue;
-      const Duration jobs =
-          std::min(arrivals(callbacks[j], length + callbacks[j].response - 1), polls + before(callbacks, j, i));
-      found.shares[j] = multiply(jobs, callbacks[j].wcet);
-      sum = add(sum, found.shares[j]);
-    }
-    return add(sum, 1);
-  });
-  if (!ends) return std::nullopt;
-  found.response = window - 1 + own.wcet;
-  return found;
-}
-
 // The work in any window of length x by jobs that execute one after the other, within J + R of their releases.
 Duration work_of(const Callback &callback, Duration x) {
   const Duration until = add(x, callback.ready + callback.response - callback.wcet);
@@ -238,7 +206,7 @@ std::optional<FromReady> rates_response(const std::vector<Callback> &callbacks, 
     return global::least_window(sum, largest.entries(), threads);
   });
   if (!found) return std::nullopt;
-  FromReady result{d - 1 + own.wcet, 0, std::vector<Duration>(callbacks.size(), 0)};
+  FromReady result{d - 1 + own.wcet, std::vector<Duration>(callbacks.size(), 0)};
   // Shares of a sum that is divided once: they add up to d - 1. With very many threads the last one takes what remains.
   const auto m = static_cast<Duration>(threads);
   Duration sum = 0;
@@ -256,11 +224,6 @@ std::optional<FromReady> rates_response(const std::vector<Callback> &callbacks, 
 Outcome apply_casini(const TaskSet &task_set) {
   if (auto reason = why_not_one_thread(task_set)) return NotApplicable{*reason};
   return Executor(task_set, casini_response).run();
-}
-
-Outcome apply_blass(const TaskSet &task_set) {
-  if (auto reason = why_not_one_thread(task_set)) return NotApplicable{*reason};
-  return Executor(task_set, blass_response).run();
 }
 
 Outcome apply_rates(const TaskSet &task_set) {
@@ -299,14 +262,6 @@ Method casini() {
       "D. Casini, T. Blass, I. Luetkebohle, B. Brandenburg, Response-time analysis of ROS 2 processing chains "
       "under reservation-based scheduling, ECRTS 2019",
       kOneThread, "O(tasks^2) per round, at most 1000 rounds", apply_casini);
-}
-
-Method blass() {
-  return make_wait_set_method(
-      "blass",
-      "T. Blass, D. Casini, S. Bozhko, B. Brandenburg, A ROS 2 response-time analysis exploiting starvation "
-      "freedom and execution-time variance, RTSS 2021 (theorem 2, without execution-time curves)",
-      kOneThread, "pseudo-polynomial; O(tasks^2) per step, at most 1000 rounds", apply_blass);
 }
 
 Method wait_set_rates() {

@@ -48,7 +48,6 @@ TEST(BoundProperty, WaitSetRates) {
   expect_holds(wait_set_rates(), 4, 0.4);
 }
 TEST(BoundProperty, WaitSetCasini) { expect_holds(casini(), 1, 0.6); }
-TEST(BoundProperty, WaitSetBlass) { expect_holds(blass(), 1, 0.5); }
 
 Workload three_timers(std::uint32_t workers) {
   Workload workload = testing::independent({{3, 100}, {5, 100}, {7, 100}}, workers);
@@ -72,7 +71,7 @@ TEST(WaitSetBound, ACallbackThatSeldomComesCountsOnce) {
   Workload workload = three_timers(1);
   const TaskSet task_set = testing::compiled(workload);
   // Registered 3, 5, 7. By windows: 3 + 5 + 7, 5 + 2 * 3 + 7, 7 + 2 * (3 + 5); within 100 each arrives only once.
-  for (const Method &method : {casini(), blass(), wait_set_rates()}) {
+  for (const Method &method : {casini(), wait_set_rates()}) {
     const Outcome outcome = method.apply(task_set);
     for (const ResponseBound &bound : std::get<Bound>(outcome).tasks) EXPECT_EQ(bound.response, 15) << method.name;
   }
@@ -135,7 +134,6 @@ TEST(WaitSetBound, WorkComesCloserWithJitter) {
 TEST(WaitSetBound, RatesAreNeverAboveWindows) {
   expect_never_above(wait_set_rates(), wait_set(), 4);
   expect_never_above(wait_set_rates(), wait_set(), 1);
-  expect_never_above(wait_set_rates(), blass(), 1);
 }
 
 TEST(WaitSetBound, MoreExecutionNeverShrinksABoundAndTermsAddUp) {

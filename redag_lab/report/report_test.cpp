@@ -77,7 +77,7 @@ TEST(Bounds, OtherExecutorsHaveTheirOwnOrNone) {
   const RunBounds events = bounds_of(simulated(workload, kSecond, "events").info);
   ASSERT_EQ(events.tasks.size(), 2U) << events.absent;
   EXPECT_EQ(events.tasks[1].response, 22 * kMillisecond);
-  EXPECT_EQ(events.tasks[1].method, "bertogna_cirinei_any") << "nothing that counts on windows";
+  EXPECT_EQ(events.tasks[1].method, "dag_any") << "nothing that counts on windows";
   trace::RunInfo unknown = ste.info;
   unknown.executor = "SingleThreadedExecutor";
   EXPECT_FALSE(bounds_of(unknown).absent.empty());

@@ -98,7 +98,7 @@ class Analyze(Case):
         self.assertRegex(result.stdout, r"slow\.plan +100ms +\S+ms +\S+ms +ok +dag_one_worker_deferred")
         self.assertIn("preemption: none\n", result.stdout)
         self.assertIn("not shown schedulable: 2 tasks without a bound", result.stdout)
-        self.assertRegex(result.stdout, r"methods that do not apply:\n(.*\n)*  \S.*\n    .*\bmelani\b")
+        self.assertRegex(result.stdout, r"methods that do not apply:\n(.*\n)*  \S.*\n    .*\bdag_bounded\b")
 
     def test_three_lines(self):
         lines = self.expect(redag("analyze", self.cart), 0).stdout.splitlines()
@@ -285,7 +285,7 @@ dags:
     def test_narrow_terminal(self):
         status, text = in_terminal("analyze", self.cart, "--all", columns=50, NO_COLOR="1")
         self.assertEqual(status, 0, text)
-        rows = [line for line in text.splitlines() if re.match(r"(fast|slow|melani)", line)]
+        rows = [line for line in text.splitlines() if re.match(r"(fast|slow|dag_bounded)", line)]
         self.assertLessEqual(max(map(len, rows)), 50, text)
 
 

@@ -21,7 +21,7 @@ experiment: acceptance
 dags: 6
 workers: 2
 utilization: {{from: 0.2, to: 0.8, step: 0.2}}
-methods: [any, simulation, melani]
+methods: [any, simulation, dag_bounded]
 sets: {sets}
 seed: {seed}
 simulation: {{offsets: 5, periods: {periods}}}

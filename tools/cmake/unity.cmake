@@ -23,7 +23,6 @@ set(alone
   redag_analysis/one_worker/edf_demand_test.cpp
   redag_analysis/one_worker/paper_test.cpp
   redag_analysis/one_worker/response_time_test.cpp
-  redag_analysis/one_worker/utilization_test.cpp
   redag_analysis/sim/waits_test.cpp
   redag_lab/cli/analyze/analysis_report_test.cpp
   redag_lab/experiment/factorial_plan_test.cpp
