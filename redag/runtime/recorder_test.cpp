@@ -20,8 +20,8 @@
 #include "redag/runtime/executor.hpp"
 #include "redag/threads/clock.hpp"
 #include "redag/trace/events_file.hpp"
+#include "redag_analysis/metrics/check/trace_checker.hpp"
 #include "redag_analysis/metrics/summary.hpp"
-#include "redag_analysis/metrics/trace_checker.hpp"
 #include "tests/testing/one_worker.hpp"
 #include "tests/testing/recorded_run.hpp"
 

@@ -10,7 +10,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "redag_analysis/metrics/trace_checker.hpp"
+#include "redag_analysis/metrics/check/trace_checker.hpp"
 #include "redag_analysis/sim/simulator.hpp"
 #include "tests/testing/timeline.hpp"
 

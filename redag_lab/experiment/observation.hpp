@@ -14,7 +14,7 @@
 
 #include "redag/base/result.hpp"
 #include "redag/trace/trace.hpp"
-#include "redag_analysis/metrics/check_report.hpp"
+#include "redag_analysis/metrics/check/check_report.hpp"
 #include "redag_analysis/metrics/summary.hpp"
 
 namespace redag::experiment {

@@ -8,8 +8,8 @@
 
 #include "redag/base/check.hpp"
 #include "redag/trace/worker_count.hpp"
+#include "redag_analysis/metrics/check/trace_checker.hpp"
 #include "redag_analysis/metrics/miss.hpp"
-#include "redag_analysis/metrics/trace_checker.hpp"
 
 namespace redag::report {
 namespace {

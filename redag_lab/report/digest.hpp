@@ -14,7 +14,7 @@
 #include "redag/base/result.hpp"
 #include "redag/trace/recording.hpp"
 #include "redag_analysis/metrics/assumptions.hpp"
-#include "redag_analysis/metrics/check_report.hpp"
+#include "redag_analysis/metrics/check/check_report.hpp"
 #include "redag_analysis/metrics/summary.hpp"
 #include "redag_lab/report/bounds.hpp"
 #include "redag_lab/report/curves.hpp"

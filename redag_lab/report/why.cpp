@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "redag_analysis/metrics/why_remedy.hpp"
-#include "redag_analysis/metrics/why_text.hpp"
+#include "redag_analysis/metrics/why/why_remedy.hpp"
+#include "redag_analysis/metrics/why/why_text.hpp"
 
 namespace redag::report {
 namespace {

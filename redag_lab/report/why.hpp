@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
-#include "redag_analysis/metrics/why.hpp"
+#include "redag_analysis/metrics/why/why.hpp"
 
 namespace redag::report {
 

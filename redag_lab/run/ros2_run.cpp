@@ -21,7 +21,7 @@
 #include "redag/loader/workload_yaml.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/output_file.hpp"
-#include "redag_analysis/metrics/trace_checker.hpp"
+#include "redag_analysis/metrics/check/trace_checker.hpp"
 
 extern char **environ;  // NOLINT(readability-redundant-declaration): POSIX has it in no header
 

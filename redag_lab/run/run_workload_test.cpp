@@ -18,7 +18,7 @@
 #include "redag/threads/setup.hpp"
 #include "redag/threads/threads.hpp"
 #include "redag_analysis/executors/executors.hpp"
-#include "redag_analysis/metrics/trace_checker.hpp"
+#include "redag_analysis/metrics/check/trace_checker.hpp"
 #include "tests/testing/builders.hpp"
 
 namespace redag::lab {

@@ -18,7 +18,7 @@
 #include "redag_analysis/analyze/analyze.hpp"
 #include "redag_analysis/analyze/executors.hpp"
 #include "redag_analysis/executors/executors.hpp"
-#include "redag_analysis/metrics/trace_checker.hpp"
+#include "redag_analysis/metrics/check/trace_checker.hpp"
 #include "redag_lab/run/run_workload.hpp"
 
 namespace redag::lab {

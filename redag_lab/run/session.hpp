@@ -18,7 +18,7 @@
 #include "redag/model/workload.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/trace.hpp"
-#include "redag_analysis/metrics/check_report.hpp"
+#include "redag_analysis/metrics/check/check_report.hpp"
 #include "redag_analysis/metrics/run_files.hpp"
 #include "redag_analysis/metrics/summary.hpp"
 #include "redag_analysis/sim/simulator.hpp"

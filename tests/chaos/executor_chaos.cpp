@@ -24,7 +24,7 @@
 #include "redag/runtime/executor.hpp"
 #include "redag/threads/clock.hpp"
 #include "redag/threads/threads.hpp"
-#include "redag_analysis/metrics/trace_checker.hpp"
+#include "redag_analysis/metrics/check/trace_checker.hpp"
 #include "tests/chaos/chaos.hpp"
 
 namespace redag::chaos {

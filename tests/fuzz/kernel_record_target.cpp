@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include "redag/base/check.hpp"
-#include "redag_analysis/metrics/kernel_record.hpp"
-#include "redag_analysis/metrics/why_kernel.hpp"
+#include "redag_analysis/metrics/why/kernel_record.hpp"
+#include "redag_analysis/metrics/why/why_kernel.hpp"
 #include "tests/fuzz/targets.hpp"
 
 namespace redag::fuzz {

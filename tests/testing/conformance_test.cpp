@@ -8,7 +8,7 @@
 #include "redag/base/rng.hpp"
 #include "redag/sched/policy.hpp"
 #include "redag/threads/setup.hpp"
-#include "redag_analysis/metrics/trace_checker.hpp"
+#include "redag_analysis/metrics/check/trace_checker.hpp"
 #include "tests/testing/drivers.hpp"
 #include "tests/testing/environment.hpp"
 #include "tests/testing/random_workloads.hpp"

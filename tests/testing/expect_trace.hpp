@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "redag_analysis/metrics/trace_checker.hpp"
+#include "redag_analysis/metrics/check/trace_checker.hpp"
 
 namespace redag::testing {
 

@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "redag/trace/events_file.hpp"
-#include "redag_analysis/metrics/trace_checker.hpp"
+#include "redag_analysis/metrics/check/trace_checker.hpp"
 
 namespace redag::testing {
 

@@ -18,8 +18,8 @@ set(alone
   redag_analysis/metrics/jobs_test.cpp
   redag_analysis/metrics/perfetto_test.cpp
   redag_analysis/metrics/summary_test.cpp
-  redag_analysis/metrics/trace_checker_test.cpp
-  redag_analysis/metrics/why_test.cpp
+  redag_analysis/metrics/check/trace_checker_test.cpp
+  redag_analysis/metrics/why/why_test.cpp
   redag_analysis/one_worker/edf_demand_test.cpp
   redag_analysis/one_worker/paper_test.cpp
   redag_analysis/one_worker/response_time_test.cpp

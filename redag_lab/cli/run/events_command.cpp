@@ -19,7 +19,7 @@
 #include "redag/trace/run_info_json.hpp"
 #include "redag_analysis/metrics/jobs_csv.hpp"
 #include "redag_analysis/metrics/perfetto.hpp"
-#include "redag_analysis/metrics/trace_checker.hpp"
+#include "redag_analysis/metrics/check/trace_checker.hpp"
 #include "redag_analysis/text/table.hpp"
 #include "redag_lab/cli/run/recorded_runs.hpp"
 #include "redag_lab/cli/run/run_report.hpp"

@@ -1,14 +1,14 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Presents explanations (redag_analysis/metrics/why.hpp) on the terminal and as JSON. Pure.
+// Presents explanations (redag_analysis/metrics/why/why.hpp) on the terminal and as JSON. Pure.
 #pragma once
 
 #include <cstdint>
 #include <string>
 #include <vector>
 
-#include "redag_analysis/metrics/why.hpp"
+#include "redag_analysis/metrics/why/why.hpp"
 #include "redag_lab/cli/terminal/console.hpp"
 #include "redag_lab/cli/terminal/json.hpp"
 

@@ -25,7 +25,7 @@
 #include "rclcpp/rclcpp.hpp"
 #include "redag/base/time.hpp"
 #include "redag/trace/events_file.hpp"
-#include "redag_analysis/metrics/trace_checker.hpp"
+#include "redag_analysis/metrics/check/trace_checker.hpp"
 #include "spinning.hpp"
 #include "std_msgs/msg/float64.hpp"
 #include "std_srvs/srv/trigger.hpp"

@@ -24,7 +24,7 @@
 #include "mode_test.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "redag/runtime/blocking.hpp"
-#include "redag_analysis/metrics/trace_checker.hpp"
+#include "redag_analysis/metrics/check/trace_checker.hpp"
 #include "spinning.hpp"
 
 namespace redag_rclcpp {

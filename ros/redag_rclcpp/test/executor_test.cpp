@@ -25,7 +25,7 @@
 #include "redag/live/writer.hpp"
 #include "redag/loader/validate.hpp"
 #include "redag/threads/parker.hpp"
-#include "redag_analysis/metrics/trace_checker.hpp"
+#include "redag_analysis/metrics/check/trace_checker.hpp"
 #include "spinning.hpp"
 
 namespace redag_rclcpp {

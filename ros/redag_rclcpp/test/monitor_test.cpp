@@ -20,7 +20,7 @@
 #include "redag/loader/workload_yaml.hpp"
 #include "redag/threads/threads.hpp"
 #include "redag/trace/events_file.hpp"
-#include "redag_analysis/metrics/trace_checker.hpp"
+#include "redag_analysis/metrics/check/trace_checker.hpp"
 #include "spinning.hpp"
 #include "std_msgs/msg/string.hpp"
 #include "std_srvs/srv/trigger.hpp"

@@ -15,7 +15,7 @@
 #include "mode_test.hpp"
 #include "redag/runtime/blocking.hpp"
 #include "redag_analysis/executors/executors.hpp"
-#include "redag_analysis/metrics/trace_checker.hpp"
+#include "redag_analysis/metrics/check/trace_checker.hpp"
 #include "redag_analysis/sim/simulator.hpp"
 #include "spinning.hpp"
 

@@ -26,7 +26,7 @@
 #include "redag/base/mutex.hpp"
 #include "redag/threads/setup.hpp"
 #include "redag/threads/threads.hpp"
-#include "redag_analysis/metrics/trace_checker.hpp"
+#include "redag_analysis/metrics/check/trace_checker.hpp"
 #include "redag_rclcpp/executor.hpp"
 #include "workload_nodes.hpp"
 

@@ -21,8 +21,8 @@
 #include "redag/model/demand.hpp"
 #include "redag/threads/setup.hpp"
 #include "redag/trace/worker_count.hpp"
+#include "redag_analysis/metrics/check/trace_checker.hpp"
 #include "redag_analysis/metrics/jobs.hpp"
-#include "redag_analysis/metrics/trace_checker.hpp"
 #include "workload_run.hpp"
 
 namespace redag_rclcpp::lab {
