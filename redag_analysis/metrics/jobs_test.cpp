@@ -11,7 +11,7 @@
 #include <filesystem>
 
 #include "redag/trace/output_file.hpp"
-#include "redag_analysis/metrics/jobs_csv.hpp"
+#include "redag_analysis/metrics/files/jobs_csv.hpp"
 #include "tests/testing/builders.hpp"
 #include "tests/testing/trace_builder.hpp"
 

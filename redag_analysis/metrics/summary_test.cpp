@@ -7,8 +7,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "redag_analysis/metrics/perfetto.hpp"
-#include "redag_analysis/metrics/summary_json.hpp"
+#include "redag_analysis/metrics/files/summary_json.hpp"
+#include "redag_analysis/metrics/perfetto/perfetto.hpp"
 #include "tests/testing/builders.hpp"
 #include "tests/testing/trace_builder.hpp"
 

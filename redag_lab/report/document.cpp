@@ -15,8 +15,8 @@
 #include "redag/base/words.hpp"
 #include "redag/trace/run_info_json.hpp"
 #include "redag/version.hpp"
+#include "redag_analysis/metrics/files/summary_json.hpp"
 #include "redag_analysis/metrics/miss.hpp"
-#include "redag_analysis/metrics/summary_json.hpp"
 #include "redag_lab/report/verdict.hpp"
 
 namespace redag::report {

@@ -19,7 +19,7 @@
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/trace.hpp"
 #include "redag_analysis/metrics/check/check_report.hpp"
-#include "redag_analysis/metrics/run_files.hpp"
+#include "redag_analysis/metrics/files/run_files.hpp"
 #include "redag_analysis/metrics/summary.hpp"
 #include "redag_analysis/sim/simulator.hpp"
 #include "redag_lab/run/variant.hpp"

@@ -9,7 +9,7 @@
 #include <filesystem>
 
 #include "redag/trace/events_file.hpp"
-#include "redag_analysis/metrics/summary_json.hpp"
+#include "redag_analysis/metrics/files/summary_json.hpp"
 #include "tests/testing/builders.hpp"
 
 namespace redag::lab {

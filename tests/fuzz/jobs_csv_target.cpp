@@ -3,7 +3,7 @@
 
 #include "redag/base/check.hpp"
 #include "redag/loader/workload_yaml.hpp"
-#include "redag_analysis/metrics/jobs_csv.hpp"
+#include "redag_analysis/metrics/files/jobs_csv.hpp"
 #include "tests/fuzz/targets.hpp"
 
 namespace redag::fuzz {

@@ -16,7 +16,7 @@ set(alone
   redag_analysis/many_workers/suspension_aware_test.cpp
   redag_analysis/metrics/deadline_watch_test.cpp
   redag_analysis/metrics/jobs_test.cpp
-  redag_analysis/metrics/perfetto_test.cpp
+  redag_analysis/metrics/perfetto/perfetto_test.cpp
   redag_analysis/metrics/summary_test.cpp
   redag_analysis/metrics/check/trace_checker_test.cpp
   redag_analysis/metrics/why/why_test.cpp

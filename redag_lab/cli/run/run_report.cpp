@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "redag/base/text.hpp"
-#include "redag_analysis/metrics/summary_json.hpp"
+#include "redag_analysis/metrics/files/summary_json.hpp"
 #include "redag_analysis/metrics/verdict.hpp"
 #include "redag_analysis/text/table.hpp"
 #include "redag_lab/cli/run/bound_report.hpp"

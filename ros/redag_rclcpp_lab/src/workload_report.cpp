@@ -11,8 +11,8 @@
 #include "redag/base/text.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/output_file.hpp"
-#include "redag_analysis/metrics/run_files.hpp"
-#include "redag_analysis/metrics/summary_json.hpp"
+#include "redag_analysis/metrics/files/run_files.hpp"
+#include "redag_analysis/metrics/files/summary_json.hpp"
 #include "redag_analysis/text/table.hpp"
 #include "workload_run.hpp"
 

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "redag/trace/trace.hpp"
-#include "redag_analysis/metrics/summary_json.hpp"
+#include "redag_analysis/metrics/files/summary_json.hpp"
 
 namespace redag_rclcpp {
 

@@ -13,7 +13,7 @@
 #include "redag/base/result.hpp"
 #include "redag/model/job_event.hpp"
 #include "redag/trace/events_file.hpp"
-#include "redag_analysis/metrics/run_files.hpp"
+#include "redag_analysis/metrics/files/run_files.hpp"
 #include "redag_rclcpp/executor.hpp"
 
 namespace redag_rclcpp {

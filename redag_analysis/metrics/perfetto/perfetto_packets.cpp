@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_analysis/metrics/perfetto_packets.hpp"
+#include "redag_analysis/metrics/perfetto/perfetto_packets.hpp"
 
 #include <zlib.h>
 

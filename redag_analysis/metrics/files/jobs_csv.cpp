@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_analysis/metrics/jobs_csv.hpp"
+#include "redag_analysis/metrics/files/jobs_csv.hpp"
 
 #include <fmt/compile.h>
 #include <fmt/format.h>

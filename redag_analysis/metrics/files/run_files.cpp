@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_analysis/metrics/run_files.hpp"
+#include "redag_analysis/metrics/files/run_files.hpp"
 
 #include <filesystem>
 #include <system_error>

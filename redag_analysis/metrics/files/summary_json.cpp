@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_analysis/metrics/summary_json.hpp"
+#include "redag_analysis/metrics/files/summary_json.hpp"
 
 #include <nlohmann/json.hpp>
 #include <utility>

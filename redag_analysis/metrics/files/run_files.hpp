@@ -16,8 +16,8 @@
 #include "redag/base/result.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/trace.hpp"
-#include "redag_analysis/metrics/jobs_csv.hpp"
-#include "redag_analysis/metrics/perfetto.hpp"
+#include "redag_analysis/metrics/files/jobs_csv.hpp"
+#include "redag_analysis/metrics/perfetto/perfetto.hpp"
 
 namespace redag::metrics {
 
