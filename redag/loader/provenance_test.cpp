@@ -32,7 +32,7 @@ TEST_F(ProvenanceTest, OfThisProcess) {
       << provenance.revision;
   EXPECT_FALSE(provenance.host.empty());
   EXPECT_EQ(provenance.kernel.rfind("Linux ", 0), 0U) << provenance.kernel;
-  EXPECT_NE(provenance.command.find("redag_base_test"), std::string::npos) << provenance.command;
+  EXPECT_NE(provenance.command.find("redag_model_test"), std::string::npos) << provenance.command;
   EXPECT_EQ(provenance.calibration, "none");
 }
 

@@ -96,8 +96,11 @@ endforeach()
 
 install(FILES ${PROJECT_SOURCE_DIR}/docs/workload.schema.json ${PROJECT_SOURCE_DIR}/docs/robot.schema.json
   DESTINATION ${CMAKE_INSTALL_DATADIR}/redag COMPONENT redag_tools)
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/workloads ${PROJECT_SOURCE_DIR}/evaluation/experiments ${PROJECT_SOURCE_DIR}/examples/robot
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/workloads ${PROJECT_SOURCE_DIR}/examples/robot
   DESTINATION ${CMAKE_INSTALL_DATADIR}/redag COMPONENT redag_tools FILES_MATCHING PATTERN "*.yaml")
+# Plans name workloads by their places in the repository.
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/evaluation/experiments
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/redag/evaluation COMPONENT redag_tools FILES_MATCHING PATTERN "*.yaml")
 file(GLOB examples CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/examples/*.cpp)
 list(FILTER examples EXCLUDE REGEX workload)  # needs the workbench, which is not installed
 install(FILES ${examples} DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/libredag-dev/examples COMPONENT libredag_dev)
