@@ -119,7 +119,7 @@ class Limits(Case):
             self.assertEqual(sum(term["amount_ns"] for term in task["terms"]), task["bound_ns"])
 
     def test_interrupt_keeps_what_was_found(self):
-        many = self.write("many.yaml", independent(6_000, 2))
+        many = self.write("many.yaml", independent(6_000, 2, "edf"))
         process = subprocess.Popen([PROGRAM, "analyze", many, "--effort", "0", "--json"], stdout=subprocess.PIPE,
                                    stderr=subprocess.PIPE, text=True)
         interrupt(process, 4)
@@ -127,7 +127,7 @@ class Limits(Case):
         self.assertEqual(process.returncode, 0, err)
         document = json.loads(out)
         self.assertIn("interrupted", {method["reason"] for method in document["methods"]})
-        self.assertTrue(document["schedulable"], "utilization tests take no time")
+        self.assertTrue(document["schedulable"], "edf_global_density takes no time")
 
 
 if __name__ == "__main__":
