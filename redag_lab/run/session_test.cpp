@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <cstdlib>
 #include <filesystem>
 
 #include "redag/trace/events_file.hpp"
@@ -52,6 +53,8 @@ TEST(Session, TheVariantDecidesThePreemption) {
 }
 
 TEST(Session, ACutTraceIsThatOfAShorterRun) {
+  // Both runs state this time of day.
+  ::setenv("SOURCE_DATE_EPOCH", "1700000000", 1);
   SessionOptions options = simulated(2 * kSecond);
   const Session whole = run("redag", options);
   EXPECT_FALSE(whole.cut_at.has_value());
@@ -66,6 +69,7 @@ TEST(Session, ACutTraceIsThatOfAShorterRun) {
   EXPECT_GT(cut.check.checks(metrics::Rule::Grid), 0U);
   // The summary covers the whole run.
   EXPECT_EQ(metrics::summary_to_json(cut.summary, cut.info), metrics::summary_to_json(whole.summary, whole.info));
+  ::unsetenv("SOURCE_DATE_EPOCH");
 }
 
 TEST(Session, StopEndsItWithWhatThereIs) {
