@@ -66,7 +66,8 @@ TEST_F(LoadTest, OtherFilesAreNoPlans) {
 
 TEST(RepositoryPlans, AreWithoutMistakes) {
   int seen = 0;
-  for (const auto &entry : std::filesystem::recursive_directory_iterator(testing::repository() / "evaluation" / "experiments")) {
+  for (const auto &entry :
+       std::filesystem::recursive_directory_iterator(testing::repository() / "evaluation" / "experiments")) {
     if (entry.path().extension() != ".yaml") continue;
     const Result<LoadedExperiment> loaded = load_experiment(entry.path().string(), any_executor, {});
     EXPECT_TRUE(loaded) << to_string(loaded.error());
