@@ -13,49 +13,53 @@
 namespace redag::analysis {
 namespace {
 
+// True if only the hop of its bound says how often the task hands data over: it or its unit waits for data of other
+// rates, or its DAG is bounded from the origin of such data.
+bool needs_hop(const TaskSet &task_set, const CompiledTask &task) {
+  const auto waits = [&](std::uint32_t u) { return !task_set.units[u].awaits.empty(); };
+  const std::vector<std::uint32_t> &units = task_set.dags[task.dag.value].units;
+  return waits(task.unit) ||
+         (task_set.units[task.unit].tasks.size() > 1 && std::any_of(units.begin(), units.end(), waits));
+}
+
 bool hands_over(const TaskSet &task_set, TaskId from, TaskId to) {
   const std::vector<std::uint32_t> &before = task_set.tasks[to.value].predecessors;
   return task_set.tasks[from.value].unit == task_set.tasks[to.value].unit &&
          std::find(before.begin(), before.end(), from.value) != before.end();
 }
 
-// The response from the unit's release. A task of a larger unit may be bounded only from its own release, but its DAG
-// is bounded from the unit's.
-// Such edges shift the releases of tasks in their own DAG. Those of other DAGs stay periodic.
-bool joins_rates(const TaskSet &task_set, const CompiledDag &dag) {
-  return std::any_of(dag.units.begin(), dag.units.end(),
-                     [&](std::uint32_t unit) { return !task_set.units[unit].awaits.empty(); });
-}
-
-const ResponseBound *response_of(const TaskSet &task_set, TaskId task, const Bound &bound) {
+// The bound from the unit's release. A task of a larger unit may be bounded only from its own release, but its DAG is
+// bounded from the unit's. In a DAG with edges between rates, the task's own bound states its hop.
+const ResponseBound *bound_of(const TaskSet &task_set, TaskId task, const Bound &bound) {
   const CompiledTask &compiled = task_set.tasks[task.value];
   const bool single = task_set.units[compiled.unit].tasks.size() == 1;
-  const std::vector<ResponseBound> &responses = single ? bound.tasks : bound.dags;
-  const std::uint32_t position = single ? task.value : compiled.dag.value;
+  const bool states_hop = task.value < bound.tasks.size() && bound.tasks[task.value].hop;
+  const std::vector<ResponseBound> &responses = single || states_hop ? bound.tasks : bound.dags;
+  const std::uint32_t position = single || states_hop ? task.value : compiled.dag.value;
   return position < responses.size() && responses[position].response ? &responses[position] : nullptr;
 }
 
 // True if a job of `from` that is released no later than one of `to` always ends before that one starts. It must be
-// ready when released, only its priority may decide, no job may run beside it, and it must not leave the worker.
+// ready when released, only its priority may decide, no job may run beside it, and it must not leave the worker. The
+// consumer must read on its own grid.
 bool goes_first(const TaskSet &task_set, const ChainSegment &from, const ChainSegment &to) {
   const CompiledTask &producer = task_set.tasks[from.last.value];
   const CompiledTask &consumer = task_set.tasks[to.first.value];
   const bool alone = from.first == from.last && producer.predecessors.empty();
   return task_set.platform.workers == 1 && is_static(task_set.policy) && alone && producer.jitter == 0 &&
          producer.group == kNoGroup && producer.wake_ups == 0 && task_set.dags[producer.dag.value].max_active == 0 &&
-         producer.tier < consumer.tier && task_set.mode != sched::Preemption::Cooperative;
+         producer.tier < consumer.tier && task_set.mode != sched::Preemption::Cooperative &&
+         task_set.units[consumer.unit].awaits.empty();
 }
 
-Duration one_worker_reaction(const TaskSet &task_set, const std::vector<ChainSegment> &segments) {
-  Duration sum = add(segments.front().period, segments.back().response);
-  for (std::size_t i = 0; i + 1 < segments.size(); ++i) {
-    const ChainSegment &from = segments[i];
-    const ChainSegment &to = segments[i + 1];
-    const Duration step =
-        goes_first(task_set, from, to) ? std::max(from.response, to.period) : add(to.period, from.response);
-    sum = add(sum, step);
+Duration one_worker_reaction(const TaskSet &task_set, const ChainBound &chain) {
+  Duration saved = 0;  // max(R, T') instead of R + T', for each producer that goes first
+  for (std::size_t i = 0; i + 1 < chain.segments.size(); ++i) {
+    const ChainSegment &from = chain.segments[i];
+    const ChainSegment &to = chain.segments[i + 1];
+    if (goes_first(task_set, from, to)) saved += std::min(from.response, to.period);
   }
-  return sum;
+  return chain.sum - saved;
 }
 
 }  // namespace
@@ -69,20 +73,11 @@ std::variant<NotApplicable, ChainBound> chain_bound(const TaskSet &task_set, std
   } else if (task_set.threads_suffice_if_bounded) {
     return NotApplicable{"there are fewer threads than tasks, and edges join tasks of different periods or offsets"};
   }
-  for (const TaskId task : chain) {
-    const CompiledDag &dag = task_set.dags[task_set.tasks[task.value].dag.value];
-    if (joins_rates(task_set, dag)) {
-      return NotApplicable{"edges join tasks of different periods or offsets in DAG '" + dag.name + "'"};
-    }
-  }
   ChainBound result;
   for (std::size_t i = 0; i < chain.size(); ++i) {
-    if (i > 0 && hands_over(task_set, chain[i - 1], chain[i])) {
-      result.segments.back().last = chain[i];
-      continue;
-    }
     const CompiledTask &task = task_set.tasks[chain[i].value];
-    const ResponseBound *response = response_of(task_set, chain[i], bound);
+    const bool continues = i > 0 && hands_over(task_set, chain[i - 1], chain[i]);
+    const ResponseBound *response = bound_of(task_set, chain[i], bound);
     if (task.has_gaps) {
       return NotApplicable{"task '" + task.name +
                            "' is released by events, and nothing bounds the time until the next"};
@@ -92,12 +87,17 @@ std::variant<NotApplicable, ChainBound> chain_bound(const TaskSet &task_set, std
       return NotApplicable{"task '" + task.name +
                            "': its response time can exceed its period, which can hold data back for longer"};
     }
-    result.segments.push_back(ChainSegment{chain[i], chain[i], task.period, *response->response});
+    if (needs_hop(task_set, task) && !response->hop) {
+      return NotApplicable{"task '" + task.name + "' waits for data, and nothing bounds the time until the next"};
+    }
+    if (!continues) result.segments.push_back({chain[i], chain[i], task.period, 0, 0});
+    ChainSegment &segment = result.segments.back();
+    segment.last = chain[i];
+    segment.response = *response->response;
+    segment.hop = response->hop.value_or(add(segment.period, segment.response));
   }
-  for (const ChainSegment &segment : result.segments) {
-    result.sum = add(result.sum, add(segment.period, segment.response));
-  }
-  if (task_set.platform.workers == 1) result.one_worker = one_worker_reaction(task_set, result.segments);
+  for (const ChainSegment &segment : result.segments) result.sum = add(result.sum, segment.hop);
+  if (task_set.platform.workers == 1) result.one_worker = one_worker_reaction(task_set, result);
   return result;
 }
 

@@ -22,11 +22,12 @@ struct ChainSegment {
   TaskId last;
   Duration period = 0;
   Duration response = 0;  // from the release of the unit to the finish of `last`
+  Duration hop = 0;       // what it adds to reaction and age: period + response, or ResponseBound::hop
 };
 
 struct ChainBound {
   std::vector<ChainSegment> segments;
-  /// The sum of T + R over the segments, for both reaction and age: A. Davare, Q. Zhu, M. Di Natale, C. Pinello, S.
+  /// The sum of the hops, which are T + R, for both reaction and age: A. Davare, Q. Zhu, M. Di Natale, C. Pinello, S.
   /// Kanajan, A. Sangiovanni-Vincentelli, DAC 2007. A single segment is an event-driven chain, T + R.
   Duration sum = 0;
   /// The reaction where a priority discount holds: M. Duerr, G. von der Brueggen, K.-H. Chen, J.-J. Chen, TECS 18(5s),
@@ -39,9 +40,9 @@ struct ChainBound {
 };
 
 /// Bounds reaction and age of `chain`, TaskIds in the order of the data, over strictly periodic timers (no sporadic
-/// gaps). Consecutive tasks of one unit hand over job by job if an edge joins them; others hand over by a register (the
-/// latest value). NotApplicable for a chain without tasks, and for a task without a bound in `bound` or with one above
-/// its period.
+/// gaps). Consecutive tasks of one unit hand over job by job if an edge joins them. Others hand over by a register (the
+/// latest value), also over an edge between rates. NotApplicable for a chain without tasks, and for a task without a
+/// bound in `bound` or with one above its period.
 [[nodiscard]] std::variant<NotApplicable, ChainBound> chain_bound(const TaskSet &task_set,
                                                                   std::span<const TaskId> chain, const Bound &bound);
 

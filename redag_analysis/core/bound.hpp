@@ -48,6 +48,9 @@ struct ResponseBound {
   /// The longest time from readiness (the release as seen) to the finish. Only a method that finds more than `response`
   /// less jitter sets it.
   Duration from_ready = 0;
+  /// What the task adds to reaction and age of a chain whose data it takes or begins. Only across_rates() sets it, for
+  /// tasks of DAGs with edges between rates; of others it is period + response.
+  std::optional<Duration> hop;
 
   [[nodiscard]] Duration sum(Term::Kind kind) const;
 };

@@ -247,7 +247,13 @@ class Resolver {
     for (std::uint32_t d = 0; d < task_set_.dags.size(); ++d) {
       const auto waits = [&](std::uint32_t u) { return !task_set_.units[u].awaits.empty(); };
       const std::vector<std::uint32_t> &units = task_set_.dags[d].units;
-      if (std::any_of(units.begin(), units.end(), waits)) bound.dags[d] = if_bounded(end_to_end(d));
+      if (std::none_of(units.begin(), units.end(), waits)) continue;
+      bound.dags[d] = if_bounded(end_to_end(d));
+      for (const std::uint32_t t : task_set_.dags[d].tasks) {
+        if (!bound.tasks[t].response) continue;
+        const Duration hop = oldest(t);
+        if (hop < kUnbounded) bound.tasks[t].hop = hop;
+      }
     }
     return bound;
   }

@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cstdio>
@@ -52,6 +53,13 @@ double cpu_seconds() {
     return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
   };
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+// Context switches of the process.
+double switches() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_nvcsw + usage.ru_nivcsw);
 }
 
 /// Values in microseconds unless the measurement says otherwise.
@@ -178,14 +186,16 @@ Figures start_and_stop(rclcpp::Executor &executor) {
           {"stop_ms", static_cast<double>(ended - cancelled) / 1e6}};
 }
 
-// Callbacks in a second while a ring of `count` subscriptions keeps the executor busy.
-Figures saturation(rclcpp::Executor &executor, double seconds, std::size_t count) {
+// Callbacks in a second while a ring of `count` subscriptions keeps the executor busy, and how often its threads left
+// their processors for a callback.
+Figures saturation(rclcpp::Executor &executor, double seconds, std::size_t count, bool middleware) {
   std::atomic<std::uint64_t> calls{0};
   std::atomic<bool> stop{false};
-  redag_rclcpp::lab::Ring ring(count, [&] {
+  const auto go_on = [&] {
     calls.fetch_add(1, std::memory_order_relaxed);
     return !stop;
-  });
+  };
+  redag_rclcpp::lab::Ring ring(count, go_on, middleware);
   executor.add_node(ring.node());
   Figures figures;
   {
@@ -194,16 +204,79 @@ Figures saturation(rclcpp::Executor &executor, double seconds, std::size_t count
     std::this_thread::sleep_for(20ms);
     const std::uint64_t calls_before = calls;
     const double cpu_before = cpu_seconds();
+    const double switches_before = switches();
     const auto start = steady_clock::now();
     std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
     const double elapsed = std::chrono::duration<double>(steady_clock::now() - start).count();
     const auto done = static_cast<double>(calls - calls_before);
     figures["kcalls_per_s"] = done / elapsed / 1e3;
     figures["cpu_s_per_10k"] = (cpu_seconds() - cpu_before) / done * 1e4;
+    figures["switches"] = (switches() - switches_before) / done;
     stop = true;
     std::this_thread::sleep_for(20ms);
   }
   executor.remove_node(ring.node());
+  return figures;
+}
+
+// Messages of 200 and 50 Hz from the executor's first moment on, beside two timers that compute for 60 of every 100 ms.
+// A new executor knows no rate but those of the timers. Late: more than a period behind. Lost: overwritten, too.
+Figures first_messages(rclcpp::Executor &executor, double seconds) {
+  struct Topic {
+    nanoseconds period;
+    int sent = 0;
+    int in_time = 0;
+    rclcpp::Publisher<Message>::SharedPtr publisher;
+    rclcpp::Subscription<Message>::SharedPtr subscription;
+  };
+  auto node = std::make_shared<rclcpp::Node>("bench");
+  rclcpp::SubscriptionOptions own_group;
+  std::array topics{Topic{5ms}, Topic{20ms}};
+  std::vector<std::shared_ptr<void>> kept;
+  const auto new_group = [&] {
+    const auto group = node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive);
+    kept.push_back(group);
+    return group;
+  };
+  for (Topic &topic : topics) {
+    const std::string name = "first_" + std::to_string(topic.period.count());
+    own_group.callback_group = new_group();
+    topic.publisher = node->create_publisher<Message>(name, rclcpp::QoS(10));
+    topic.subscription = node->create_subscription<Message>(
+        name, rclcpp::QoS(10),
+        [&topic](Message::UniquePtr message) {
+          burn(200us);
+          if (now_ns() - static_cast<std::int64_t>(message->data) <= topic.period.count()) ++topic.in_time;
+        },
+        own_group);
+  }
+  for (int i = 0; i < 2; ++i)
+    kept.push_back(node->create_wall_timer(
+        100ms, [] { burn(60ms); }, new_group()));
+  executor.add_node(node);
+  {
+    std::thread spinning([&] { executor.spin(); });
+    const auto begin = steady_clock::now();
+    for (int i = 1; i <= static_cast<int>(seconds * 200); ++i) {
+      std::this_thread::sleep_until(begin + i * 5ms);
+      for (Topic &topic : topics) {
+        if (i * 5ms % topic.period != 0ns) continue;
+        Message message;
+        message.data = static_cast<std::uint64_t>(now_ns());
+        topic.publisher->publish(message);
+        ++topic.sent;
+      }
+    }
+    std::this_thread::sleep_for(100ms);
+    executor.cancel();
+    spinning.join();
+  }
+  executor.remove_node(node);
+  Figures figures;
+  for (const Topic &topic : topics) {
+    const auto in_time = static_cast<double>(topic.in_time);
+    figures["late_%_" + std::to_string(1s / topic.period) + "hz"] = 100.0 * (1.0 - in_time / topic.sent);
+  }
   return figures;
 }
 
@@ -278,8 +351,10 @@ std::vector<Measurement> measurements() {
       {"intra_process", [](auto &e, double s) { return publish_latency(e, s, true); }},
       {"dds", [](auto &e, double s) { return publish_latency(e, s, false); }},
       {"arrivals_loaded", [](auto &e, double s) { return arrivals_loaded(e, s); }},
-      {"saturation_1", [](auto &e, double s) { return saturation(e, s, 1); }},
-      {"saturation_50", [](auto &e, double s) { return saturation(e, s, 50); }},
+      {"first_messages", [](auto &e, double s) { return first_messages(e, s); }},
+      {"saturation_1", [](auto &e, double s) { return saturation(e, s, 1, false); }},
+      {"saturation_50", [](auto &e, double s) { return saturation(e, s, 50, false); }},
+      {"saturation_50_dds", [](auto &e, double s) { return saturation(e, s, 50, true); }},
   };
 }
 
