@@ -88,8 +88,9 @@ std::string describe(const lab::Analysed &analysed, const std::vector<ChainRow> 
     }
     table.add({{name}, {humanize_duration(bound->reaction())}, {humanize_duration(bound->age())}, {let}});
     for (const ChainSegment &segment : bound->segments) {
-      parts += fmt::format("  {}: period {}, response {}\n", name_of(analysed, segment),
-                           humanize_duration(segment.period), humanize_duration(segment.response));
+      parts += fmt::format("  {} adds {}: period {}, response {}\n", name_of(analysed, segment),
+                           humanize_duration(segment.hop), humanize_duration(segment.period),
+                           humanize_duration(segment.response));
     }
   }
   return table.render(terminal.width, terminal.colour) + parts +
@@ -110,7 +111,8 @@ Json to_json(const lab::Analysed &analysed, const std::vector<ChainRow> &chains)
         segments.push_back(Json{{"first", task_name(analysed, segment.first)},
                                 {"last", task_name(analysed, segment.last)},
                                 {"period_ns", segment.period},
-                                {"response_ns", segment.response}});
+                                {"response_ns", segment.response},
+                                {"adds_ns", segment.hop}});
       }
     }
     document.push_back(Json{{"tasks", std::move(tasks)},

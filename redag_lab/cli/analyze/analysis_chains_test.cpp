@@ -35,7 +35,8 @@ TEST(AnalysisChains, OverSeveralDags) {
 
   const std::string text = describe(analysed, {*row}, StreamTraits{});
   EXPECT_NE(text.find("sensor.read > pipeline.first > pipeline.second"), std::string::npos) << text;
-  EXPECT_NE(text.find("  pipeline.first to pipeline.second: period 20ms, response 10ms\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("  pipeline.first to pipeline.second adds 30ms: period 20ms, response 10ms\n"), std::string::npos)
+      << text;
   const Json json = to_json(analysed, {*row});
   EXPECT_EQ(json[0]["reaction_ns"], 40 * kMillisecond);
   EXPECT_EQ(json[0]["segments"].size(), 2U);
