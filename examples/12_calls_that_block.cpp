@@ -22,7 +22,7 @@ void write_to_disk() { std::this_thread::sleep_for(12ms); }
 int main() {
   ExecutorOptions options;
   options.workers = 1;
-  options.spare_threads = 1;  // for the thread that blocks (modes none and cooperative)
+  options.threads = options.workers + 1;  // for the thread that blocks (modes none and cooperative)
   Executor executor(options);
 
   DagBuilder control("control");

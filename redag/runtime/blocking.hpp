@@ -28,7 +28,7 @@ class Blocking {
   Blocking &operator=(const Blocking &) = delete;
 
   /// Returns false if the job keeps its worker: outside a job, in another Blocking, on top of another job (preemption:
-  /// cooperative), or if no thread is left (ExecutorOptions::spare_threads). TaskStats::kept_worker counts the last
+  /// cooperative), or if no thread is left (ExecutorOptions::threads). TaskStats::kept_worker counts the last
   /// two.
   [[nodiscard]] bool lends() const { return job_ != nullptr; }
 

@@ -30,9 +30,10 @@ using namespace std::chrono_literals;
 using testing::once;
 using testing::one_worker;
 
-ExecutorOptions with_spare_threads(PreemptionMode mode, std::uint32_t threads = 1) {
+ExecutorOptions with_spare_threads(PreemptionMode mode, std::uint32_t threads = 1, std::uint32_t workers = 1) {
   ExecutorOptions options = one_worker(mode);
-  options.spare_threads = threads;
+  options.workers = workers;
+  if (mode != PreemptionMode::Os) options.threads = options.workers + threads;
   return options;
 }
 
@@ -226,9 +227,8 @@ TEST(Blocking, AJobYieldsToOneThatHasBlocked) {
 // A job that goes on after its call preempts one of two others, which keeps its thread. The spare thread is in use: no
 // other job can lend its worker, and none that is ready may start.
 TEST(Blocking, AJobThatYieldedUsesTheSpareThread) {
-  ExecutorOptions options = with_spare_threads(PreemptionMode::Cooperative);
+  ExecutorOptions options = with_spare_threads(PreemptionMode::Cooperative, 1, 2);
   options.policy = PolicyKind::Fixed;
-  options.workers = 2;
   Executor executor(options);
   std::latch both_run(2);
   std::latch urgent_goes_on(1);
@@ -362,8 +362,7 @@ TEST(Blocking, NothingAllocatesInSteadyState) {
 TEST_P(BlockingInEveryMode, TheCheckerAcceptsARecordedRun) {
   const testing::RecordedRun run;
   {
-    ExecutorOptions options = with_spare_threads(mode(), 8);
-    options.workers = 2;
+    ExecutorOptions options = with_spare_threads(mode(), 8, 2);
     options.record = run.folder().string();
     Executor executor(options);
     DagBuilder logger("logger", {.max_active = 2});

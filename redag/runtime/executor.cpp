@@ -69,7 +69,7 @@ Executor::Impl::Impl(ExecutorOptions options) : options_(std::move(options)) {
   engine.trace_capacity = options_.trace_capacity;
   engine.measure = options_.live || options_.measure;
   if (misses_) engine.misses = &misses_->log();
-  engine.spare_threads = options_.spare_threads;
+  engine.spare_threads = setup_.spare_threads;
   engine.spins = spins_before_sleep(setup_, options_.spin.count());
   if (options_.lock_memory) engine.touched_stack = kTouchedStack;
   engine.on_exception = [this](const Job &job, std::exception_ptr e) { on_exception(job, std::move(e)); };

@@ -64,7 +64,6 @@ void check(const ExecutorOptions &options) {
     refuse(fmt::format("ExecutorOptions::threads is {}, but must be 0 or at least {}, the number of workers",
                        options.threads, options.workers));
   }
-  check_range("spare_threads", options.spare_threads, 0U, kMaxWorkers);
   check_range("trace_capacity", options.trace_capacity, std::size_t{0}, kMaxTraceCapacity);
   check_range("record_bytes", options.record_bytes, kMinRecordBytes, kMaxRecordBytes);
   check_devices("ExecutorOptions::devices", options.devices);

@@ -58,11 +58,10 @@ struct ExecutorOptions {
   std::uint32_t workers = 0;  // jobs that execute at the same time, at most 4096; 0: one a usable processor
   PreemptionMode preemption = PreemptionMode::Auto;
   PolicyKind policy = PolicyKind::RateMonotonic;
-  Ties ties = Ties::Share;    // jobs of equal priority: by earlier release, or by the order of tasks
-  std::uint32_t threads = 0;  // os: jobs that can be started and unfinished at once; 0: workers + 16; at most 8192
-  /// none, cooperative: how many jobs can lend their workers at a time while they block (redag::Blocking), with a
-  /// thread for each. With `os` each started job has a thread, see `threads`. At most 4096.
-  std::uint32_t spare_threads = 0;
+  Ties ties = Ties::Share;  // jobs of equal priority: by earlier release, or by the order of tasks
+  /// Jobs that can be started and unfinished at once, with a thread for each. With none and cooperative, those beyond
+  /// `workers` are in a redag::Blocking, without a worker. 0: with os workers + 16, else workers. At most 8192.
+  std::uint32_t threads = 0;
   std::vector<int> cpus{};  // processors for the workers; empty: os takes `workers` of the usable ones
   /// What the bodies of jobs wait for with DeviceHandle::run(): accelerators and the like. A device serves as many jobs
   /// at a time as it has slots, with a thread for each.

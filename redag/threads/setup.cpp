@@ -118,6 +118,8 @@ Result<Setup> set_up(const SetupRequest &request) {
   const std::uint32_t threads = std::max(request.threads == 0 ? workers + kSpareThreads : request.threads, workers);
   setup.config = make_config(setup.mode, workers, request.policy, setup.band, threads);
   setup.config.ties = request.ties;
+  if (setup.mode.mode != PreemptionMode::Os && request.threads > workers)
+    setup.spare_threads = request.threads - workers;
   setup.missing_processors = missing_processors(workers, processors);
   if (!setup.missing_processors.empty()) setup.warnings.push_back(setup.missing_processors);
   const bool os = setup.mode.mode == PreemptionMode::Os;

@@ -71,7 +71,8 @@ struct Setup {
   Mode mode;
   PriorityBand band;
   sched::Config config;
-  std::string order_folder;  // see EngineOptions
+  std::uint32_t spare_threads = 0;  // none, cooperative: threads of jobs that block (redag::Blocking)
+  std::string order_folder;         // see EngineOptions
   std::vector<std::string> warnings;
   std::string missing_processors;  // the warning that there are fewer than workers; "": there are enough
 
@@ -88,7 +89,7 @@ struct SetupRequest {
   PolicyKind policy = PolicyKind::RateMonotonic;
   Ties ties = Ties::Share;
   std::uint32_t workers = 0;  // 0: one for each of `cpus`
-  std::uint32_t threads = 0;  // os: jobs that can be started and unfinished at once; 0: some more than workers
+  std::uint32_t threads = 0;  // jobs that can be started and unfinished at once; 0: os some more than workers
   std::vector<int> cpus{};    // empty: the processors that the process may use
   bool share_order = false;   // see ExecutorOptions
 };

@@ -108,7 +108,6 @@ class Run {
     options.policy = static_cast<PolicyKind>(rng_.uniform(0, 5));
     options.trace_capacity = 1U << 16U;
     options.threads = options.workers + static_cast<std::uint32_t>(rng_.uniform(0, 6));
-    options.spare_threads = static_cast<std::uint32_t>(rng_.uniform(0, 2));
     options.ties = rng_.uniform01() < 0.7 ? Ties::Share : Ties::Fixed;
     options.stop_timeout = 60s;
     options.on_exception = [this](const runtime::ExceptionInfo &) {

@@ -51,9 +51,7 @@ std::unique_ptr<redag::runtime::Engine> make_engine(
   engine_options.band = setup.band;
   engine_options.order_folder = setup.order_folder;
   engine_options.cpus = options.cpus;
-  if (setup.mode.mode != redag::PreemptionMode::Os && options.threads > setup.config.workers) {
-    engine_options.spare_threads = options.threads - setup.config.workers;
-  }
+  engine_options.spare_threads = setup.spare_threads;
   engine_options.trace_capacity = options.trace_capacity;
   engine_options.measure = options.live;
   engine_options.waits_priority = setup.timer_priority();
