@@ -226,8 +226,8 @@ Figures first_messages(rclcpp::Executor &executor, double seconds) {
     nanoseconds period;
     int sent = 0;
     int in_time = 0;
-    rclcpp::Publisher<Message>::SharedPtr publisher;
-    rclcpp::Subscription<Message>::SharedPtr subscription;
+    rclcpp::Publisher<Message>::SharedPtr publisher{};
+    rclcpp::Subscription<Message>::SharedPtr subscription{};
   };
   auto node = std::make_shared<rclcpp::Node>("bench");
   rclcpp::SubscriptionOptions own_group;

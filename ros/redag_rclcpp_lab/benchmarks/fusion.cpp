@@ -9,7 +9,6 @@
 #include <chrono>
 #include <functional>
 #include <memory>
-#include <random>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -19,7 +18,7 @@
 #include "ament_index_cpp/get_package_share_directory.hpp"
 #include "contenders.hpp"
 #include "message_filters/subscriber.h"
-#include "message_filters/sync_policies/latest_time.h"
+#include "message_filters/sync_policies/approximate_time.h"
 #include "message_filters/synchronizer.h"
 #include "rclcpp/rclcpp.hpp"
 #include "redag/loader/workload_yaml.hpp"
@@ -68,23 +67,17 @@ class Robot {
   explicit Robot(bool filters) {
     add_sensor("camera", 33333333ns, 3ms);
     add_sensor("lidar", 100ms, 5ms);
-    const auto fuse = [this](const Message::ConstSharedPtr &camera, const Message::ConstSharedPtr &lidar) {
-      compute(4ms);
-      fused_.camera = stamp_of(*camera);
-      fused_.lidar = stamp_of(*lidar);
-      ++fusions_;
-    };
     const auto fusion = add_node("fusion");
     if (filters) {
-      using Policy = message_filters::sync_policies::LatestTime<Message, Message>;
+      using Policy = message_filters::sync_policies::ApproximateTime<Message, Message>;
       auto camera = std::make_shared<message_filters::Subscriber<Message>>(fusion, "camera");
       auto lidar = std::make_shared<message_filters::Subscriber<Message>>(fusion, "lidar");
-      auto synchronizer = std::make_shared<message_filters::Synchronizer<Policy>>(Policy(), *camera, *lidar);
-      synchronizer->registerCallback(
-          std::function<void(const Message::ConstSharedPtr &, const Message::ConstSharedPtr &)>(fuse));
+      auto synchronizer = std::make_shared<message_filters::Synchronizer<Policy>>(Policy(10), *camera, *lidar);
+      synchronizer->registerCallback(&Robot::fuse, this);
       kept_.insert(kept_.end(), {camera, lidar, synchronizer});
     } else {
-      kept_.push_back(redag_rclcpp::join<Message, Message>(*fusion, {"camera", "lidar"}, rclcpp::QoS(10), fuse));
+      kept_.push_back(redag_rclcpp::join<Message, Message>(*fusion, {"camera", "lidar"}, rclcpp::QoS(10),
+                                                           [this](const auto &...data) { fuse(data...); }));
     }
     add_timer("control", 10ms, [this] {
       compute(500us);
@@ -120,6 +113,13 @@ class Robot {
   }
 
  private:
+  void fuse(const Message::ConstSharedPtr &camera, const Message::ConstSharedPtr &lidar) {
+    compute(4ms);
+    fused_.camera = stamp_of(*camera);
+    fused_.lidar = stamp_of(*lidar);
+    ++fusions_;
+  }
+
   rclcpp::Node::SharedPtr add_node(const std::string &name) {
     return nodes_.emplace_back(std::make_shared<rclcpp::Node>(name));
   }
