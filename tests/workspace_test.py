@@ -45,8 +45,10 @@ CMAKE_PACKAGES = {"fmt": "fmt", "nlohmann_json": "nlohmann-json-dev", "tl-expect
                   "CLI11": "cli11", "TBB": "tbb", "GTest": "libgtest-dev", "LibYAML": "libyaml-dev", "ZLIB": "zlib",
                   "Curses": "libncurses-dev", "PkgConfig": "pkg-config", "LttngUst": None, "Threads": None}
 # Folders that headers are included from, with the rosdep key that installs them. Others have the name of their package.
+# babeltrace2 is used where it is there.
 HEADER_FOLDERS = {"fmt": "fmt", "nlohmann": "nlohmann-json-dev", "tl": "libexpected-dev", "CLI": "cli11", "tbb": "tbb",
-                  "oneapi": "tbb", "gtest": "libgtest-dev", "gmock": "libgmock-dev", "arpa": None, "sys": None, "linux": None, "bits": None}
+                  "oneapi": "tbb", "gtest": "libgtest-dev", "gmock": "libgmock-dev", "arpa": None,
+                  "babeltrace2": None, "sys": None, "linux": None, "bits": None}
 # Peers and stacks for comparisons, which are used where they are installed, and what only these comparisons need.
 OPTIONAL = {"redag_rclcpp": {"cm_executors"},
             "redag_rclcpp_lab": {"autoware_reference_system", "cm_executors", "reference_interfaces", "reference_system",

@@ -21,6 +21,7 @@ using Action = std::function<int(Console &)>;
 
 Action add_validate(CLI::App &app);
 Action add_generate(CLI::App &app);
+Action add_import(CLI::App &app);
 Action add_simulate(CLI::App &app);
 Action add_run(CLI::App &app);
 Action add_calibrate(CLI::App &app);

@@ -1,0 +1,128 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "redag/base/words.hpp"
+#include "redag/loader/provenance.hpp"
+#include "redag_lab/cli/terminal/commands.hpp"
+#include "redag_lab/cli/terminal/files.hpp"
+#include "redag_lab/cli/terminal/progress.hpp"
+#include "redag_lab/cli/terminal/signals.hpp"
+#include "redag_lab/import/ctf_reader.hpp"
+#include "redag_lab/import/model.hpp"
+
+namespace redag::cli {
+namespace {
+
+struct ImportOptions {
+  std::string trace;
+  std::string file;
+  std::string process;
+};
+
+// Returns the one process to import. Otherwise prints which there are.
+std::optional<std::uint32_t> choose_process(const lab::Recording &recording, const ImportOptions &options,
+                                            Console &console) {
+  const std::vector<std::uint32_t> all = lab::processes_with_callbacks(recording);
+  std::vector<std::uint32_t> chosen;
+  std::vector<std::string> names;
+  for (const std::uint32_t process : all) {
+    const lab::ProcessRecord &record = recording.processes().at(process);
+    names.push_back(fmt::format("{} ({}, {})", process, record.program, plural(record.runs, "run")));
+    if (options.process.empty() || options.process == std::to_string(process) || options.process == record.program) {
+      chosen.push_back(process);
+    }
+  }
+  if (chosen.size() == 1) return chosen.front();
+  if (all.empty()) {
+    console.error("the recording has no run of a callback", recording.events() == 0
+                                                                ? "record the events 'ros2:*', as `ros2 trace` does"
+                                                                : "let the nodes run while it records");
+  } else if (chosen.empty()) {
+    console.error(fmt::format("--process: {} ran no callback; these did: {}", options.process, join(names)));
+  } else {
+    console.error(fmt::format("several processes ran callbacks: {}", join(names)), "choose one with --process");
+  }
+  return std::nullopt;
+}
+
+// What the file should not hide.
+std::vector<std::string> gaps_of(const lab::ReadTrace &read) {
+  std::vector<std::string> gaps;
+  if (read.lost > 0 || read.lost_more) {
+    gaps.push_back(fmt::format("unknown: {} that the tracer lost{}. Edges, rates and longest executions can be wrong.",
+                               read.lost > 0 ? plural(read.lost, "event") : std::string("events"),
+                               read.lost_more && read.lost > 0 ? ", and more" : ""));
+  }
+  if (read.stopped) gaps.emplace_back("unknown: the rest of the recording, since reading was interrupted.");
+  return gaps;
+}
+
+int import_trace(const ImportOptions &options, Console &console) {
+  if (!options.file.empty()) {
+    if (const Result<void> possible = check_output(options.file); !possible) {
+      console.note(possible.error());
+      return kExitBad;
+    }
+  }
+  lab::Recording recording;
+  const InterruptGuard guard;
+  Progress progress(console);
+  progress.set_label("reading");
+  const Result<lab::ReadTrace> read = lab::read_ros_trace(
+      options.trace, [&](const lab::RosEvent &event) { recording.add(event); },
+      [&](double done) {
+        if (progress.due()) progress.draw(done, plural(recording.events(), "event") + progress.left(done));
+        return !InterruptGuard::interrupted();
+      });
+  progress.clear();
+  if (!read) {
+    console.note(read.error());
+    return kExitBad;
+  }
+  const std::optional<std::uint32_t> process = choose_process(recording, options, console);
+  if (!process) return kExitBad;
+  Result<lab::ImportedWorkload> imported = lab::import_workload(recording, *process);
+  if (!imported) {
+    console.note(imported.error());
+    return kExitBad;
+  }
+  for (const std::string &gap : gaps_of(*read)) {
+    console.warn(gap);
+    imported->remarks.insert(imported->remarks.begin(), gap);
+  }
+  const std::string text = provenance_to_comment(current_provenance()) + lab::to_yaml(*imported);
+  if (options.file.empty()) {
+    console.print(text);
+    return kExitOk;
+  }
+  if (const Result<void> written = write_text(options.file, text); !written) {
+    console.note(written.error());
+    return kExitBad;
+  }
+  for (const std::string &remark : imported->remarks) console.say(remark + "\n");
+  console.say(fmt::format("wrote {}: {}, {}, {} left out; its comments say what is assumed, and what is unknown\n",
+                          options.file, plural(imported->workload.dags.size(), "DAG"),
+                          plural(imported->workload.task_count(), "task"),
+                          plural(imported->left_out.size(), "callback")));
+  return kExitOk;
+}
+
+}  // namespace
+
+Action add_import(CLI::App &app) {
+  auto options = std::make_shared<ImportOptions>();
+  app.add_option("TRACE", options->trace, "Folder that `ros2 trace` or LTTng recorded to: the Common Trace Format")
+      ->required();
+  app.add_option("-o,--output", options->file, "File to write (default: standard output)")->type_name("FILE");
+  app.add_option("--process", options->process,
+                 "Process to import, if several ran callbacks: its number or its program")
+      ->type_name("PROCESS");
+  return [options](Console &console) { return import_trace(*options, console); };
+}
+
+}  // namespace redag::cli

@@ -1,0 +1,102 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+#include "redag/base/check.hpp"
+#include "redag_lab/import/model.hpp"
+
+namespace redag::lab {
+namespace {
+
+constexpr double kNear = 0.2;         // intervals this near the median are those of a period
+constexpr double kMostlyNear = 0.75;  // with this share of them, messages are periodic
+constexpr double kRound = 5e-4;       // a measured period is that far from the one that was meant
+
+/// Returns the round period or rate that was probably meant, or the period itself.
+Duration round_period(double period) {
+  const auto is_near = [&](double candidate) { return std::abs(candidate - period) <= kRound * period; };
+  for (const Duration unit : {kMillisecond, 100 * kMicrosecond}) {
+    const double candidate = std::round(period / static_cast<double>(unit)) * static_cast<double>(unit);
+    if (candidate > 0 && is_near(candidate)) return static_cast<Duration>(candidate);
+  }
+  const double hertz = std::round(static_cast<double>(kSecond) / period);
+  if (hertz > 0 && is_near(static_cast<double>(kSecond) / hertz)) {
+    return static_cast<Duration>(std::llround(static_cast<double>(kSecond) / hertz));
+  }
+  return std::max<Duration>(std::llround(period), 1);
+}
+
+/// Fits a grid to the instants by least squares. Messages that did not come leave points of the grid empty.
+Arrivals fit_grid(const std::vector<Time> &instants, Duration median) {
+  std::vector<double> points = {0};
+  for (std::size_t i = 1; i < instants.size(); ++i) {
+    const double step = static_cast<double>(instants[i] - instants[i - 1]) / static_cast<double>(median);
+    points.push_back(points.back() + std::max(std::round(step), 1.0));
+  }
+  const auto count = static_cast<double>(instants.size());
+  const double mean_point = std::accumulate(points.begin(), points.end(), 0.0) / count;
+  double mean_time = 0;
+  for (const Time time : instants) mean_time += static_cast<double>(time - instants.front()) / count;
+  double covariance = 0;
+  double variance = 0;
+  for (std::size_t i = 0; i < instants.size(); ++i) {
+    const double point = points[i] - mean_point;
+    covariance += point * (static_cast<double>(instants[i] - instants.front()) - mean_time);
+    variance += point * point;
+  }
+  const double period = covariance / variance;
+  double earliest = 0;
+  double latest = 0;
+  for (std::size_t i = 0; i < instants.size(); ++i) {
+    const double off = static_cast<double>(instants[i] - instants.front()) - points[i] * period;
+    earliest = std::min(earliest, off);
+    latest = std::max(latest, off);
+  }
+  Arrivals arrivals;
+  arrivals.period = round_period(period);
+  arrivals.jitter = std::min(static_cast<Duration>(latest - earliest), arrivals.period);
+  const double missing = points.back() + 1 - count;
+  if (missing > 0) arrivals.note = fmt::format("{:.0f} of {:.0f} did not come", missing, points.back() + 1);
+  return arrivals;
+}
+
+}  // namespace
+
+Arrivals estimate_arrivals(std::vector<Time> instants) {
+  REDAG_CHECK(instants.size() >= 3, "a rate needs three arrivals");
+  std::sort(instants.begin(), instants.end());
+  std::vector<Duration> intervals;
+  for (std::size_t i = 1; i < instants.size(); ++i) intervals.push_back(instants[i] - instants[i - 1]);
+  std::vector<Duration> sorted = intervals;
+  std::sort(sorted.begin(), sorted.end());
+  const Duration median = sorted[sorted.size() / 2];
+  const auto near = std::count_if(sorted.begin(), sorted.end(), [&](Duration interval) {
+    return std::abs(static_cast<double>(interval - median)) <= kNear * static_cast<double>(median);
+  });
+  if (median > 0 && static_cast<double>(near) >= kMostlyNear * static_cast<double>(sorted.size())) {
+    return fit_grid(instants, median);
+  }
+  const double mean = static_cast<double>(instants.back() - instants.front()) / static_cast<double>(intervals.size());
+  Arrivals arrivals;
+  if (sorted.front() > 0 && static_cast<double>(sorted.front()) >= mean / 4) {
+    arrivals.period = sorted.front();
+    arrivals.sporadic = true;
+    arrivals.note = fmt::format("no period: {} is the shortest distance seen, {} the mean one",
+                                humanize_duration(sorted.front()), humanize_duration(static_cast<Duration>(mean)));
+    return arrivals;
+  }
+  // As an event with its shortest distance it would need a multiple of the processor time that it used.
+  arrivals.period = std::max<Duration>(std::llround(mean), 1);
+  arrivals.jitter = arrivals.period;
+  arrivals.note = fmt::format("unknown: it comes in bursts, {} apart at the least; the period is the mean distance",
+                              humanize_duration(sorted.front()));
+  return arrivals;
+}
+
+}  // namespace redag::lab

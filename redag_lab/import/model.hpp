@@ -1,0 +1,51 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+// Makes the workload of one process of a Recording, with what is assumed and what stays unknown. Pure functions.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "redag/base/result.hpp"
+#include "redag/model/workload.hpp"
+#include "redag_lab/import/recording.hpp"
+
+namespace redag::lab {
+
+/// A workload, and what its file says in comments.
+struct ImportedWorkload {
+  Workload workload;
+  std::vector<std::vector<std::string>> notes;  // by TaskId
+  std::vector<std::string> remarks;             // about all of it
+  std::vector<std::string> left_out;            // callbacks without a task, with the reason
+  /// How much of what the process did the tasks stand for.
+  Duration executed = 0;  // of all callbacks
+  Duration explained = 0;
+  std::uint64_t messages = 0;    // that callbacks took
+  std::uint64_t over_edges = 0;  // of these, with an edge from the task that sent them
+  std::uint64_t as_sources = 0;  // of these, to tasks with a rate of their own
+};
+
+/// How the messages or requests of a source come.
+struct Arrivals {
+  Duration period = 0;
+  Duration jitter = 0;
+  bool sporadic = false;  // `period` is the shortest distance
+  std::string note;
+};
+
+/// Estimates how often something comes, from at least three instants in any order.
+[[nodiscard]] Arrivals estimate_arrivals(std::vector<Time> instants);
+
+/// Returns the processes that ran callbacks, busiest first.
+[[nodiscard]] std::vector<std::uint32_t> processes_with_callbacks(const Recording &recording);
+
+/// Makes the workload of a process. Error: it ran no callback that was seen to be created.
+[[nodiscard]] Result<ImportedWorkload> import_workload(const Recording &recording, std::uint32_t process);
+
+/// Writes the workload with its notes as comments. Every text that is not known has the word "unknown".
+[[nodiscard]] std::string to_yaml(const ImportedWorkload &imported);
+
+}  // namespace redag::lab
