@@ -21,9 +21,8 @@ struct RosEvent {
     SubscriptionObject,    // handle: subscription of rcl; other: object of rclcpp
     SubscriptionCallback,  // handle: object of rclcpp; other: callback
     ServiceInit,           // handle: service; other: node; name
-    ServiceCallback,       // handle: service; other: callback
     TimerInit,             // handle: timer; value: period
-    TimerCallback,         // handle: timer; other: callback
+    CallbackAdded,         // handle: timer or service; other: callback
     TimerNode,             // handle: timer; other: node
     Start,                 // handle: callback; value: 1 if the message came intra-process
     End,                   // handle: callback
@@ -71,9 +70,9 @@ inline constexpr std::array kRosEventNames = {
                  "callback"},
     RosEventName{"ros2:rcl_service_init", RosEvent::Kind::ServiceInit, "service_handle", "node_handle", nullptr,
                  nullptr, "service_name"},
-    RosEventName{"ros2:rclcpp_service_callback_added", RosEvent::Kind::ServiceCallback, "service_handle", "callback"},
+    RosEventName{"ros2:rclcpp_service_callback_added", RosEvent::Kind::CallbackAdded, "service_handle", "callback"},
     RosEventName{"ros2:rcl_timer_init", RosEvent::Kind::TimerInit, "timer_handle", nullptr, nullptr, "period"},
-    RosEventName{"ros2:rclcpp_timer_callback_added", RosEvent::Kind::TimerCallback, "timer_handle", "callback"},
+    RosEventName{"ros2:rclcpp_timer_callback_added", RosEvent::Kind::CallbackAdded, "timer_handle", "callback"},
     RosEventName{"ros2:rclcpp_timer_link_node", RosEvent::Kind::TimerNode, "timer_handle", "node_handle"},
     RosEventName{"ros2:callback_start", RosEvent::Kind::Start, "callback", nullptr, nullptr, "is_intra_process"},
     RosEventName{"ros2:callback_end", RosEvent::Kind::End, "callback"},

@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <tuple>
 
 #include "redag/base/text.hpp"
 #include "redag/base/words.hpp"
@@ -19,238 +18,271 @@ namespace redag::lab {
 namespace {
 
 using CallbackKind = Callback::Kind;
+using Output = CallbackRecord::Output;
+using Positions = std::vector<std::size_t>;
 
 constexpr std::uint64_t kFewestRuns = 3;  // that tell a rate
 constexpr std::size_t kQuantiles = 20;
 constexpr std::size_t kColumns = 100;  // of comments
-constexpr double kAll = 0.95;          // so many of its runs publish: each does, but for those at begin and end
-constexpr double kLeast = 0.5;         // a message that is overwritten is not taken
+constexpr double kEdges = 2;           // runs or messages that begin and end of a recording cut off
+constexpr double kAll = 0.95;          // of what is as many, but for a few that were lost
+constexpr double kMost = 0.5;          // a message that is overwritten is not taken
 
-/// Counts that differ by what begin and end of a recording cut off, and by a few lost messages.
-bool is_near(std::uint64_t a, std::uint64_t b) {
-  const double difference = std::abs(static_cast<double>(a) - static_cast<double>(b));
-  return difference <= 2 + (1 - kAll) * static_cast<double>(std::max(a, b));
+bool is_at_least(std::uint64_t count, double share, std::uint64_t whole) {
+  return static_cast<double>(count) + kEdges >= share * static_cast<double>(whole);
 }
+bool is_as_many(std::uint64_t a, std::uint64_t b) { return is_at_least(a, kAll, b) && is_at_least(b, kAll, a); }
+
+std::string share_of(std::uint64_t part, std::uint64_t whole) {
+  return format_percent(static_cast<double>(part) / static_cast<double>(whole));
+}
+
+/// Positions that belong together.
+class Clusters {
+ public:
+  explicit Clusters(std::size_t count) : parents_(count) { std::iota(parents_.begin(), parents_.end(), 0); }
+  /// The least position of the cluster.
+  [[nodiscard]] std::size_t first(std::size_t position) const {
+    while (parents_[position] != position) position = parents_[position];
+    return position;
+  }
+  void join(std::size_t a, std::size_t b) { parents_[std::max(first(a), first(b))] = std::min(first(a), first(b)); }
+
+ private:
+  Positions parents_;
+};
 
 /// What becomes a task: a callback, or several of a node that together make one job.
 struct Unit {
-  std::vector<std::size_t> members;  // positions in Recording::callbacks(); a timer is first
-  std::uint64_t runs = 0;
+  Positions members;  // in Recording::callbacks(); a timer is first
   metrics::DurationSketch execution{1024};
-  std::vector<std::size_t> predecessors;
-  bool is_source = true;
+  Positions predecessors;  // units
   std::vector<std::string> notes;
-};
-
-/// Joins callbacks of a node which store what they take until the last one of a round has it all, and which then
-/// publish one message.
-class Joins {
- public:
-  Joins(const Recording &recording, const std::vector<std::size_t> &callbacks) : recording_(recording) {
-    parents_.resize(recording.callbacks().size());
-    std::iota(parents_.begin(), parents_.end(), 0);
-    std::map<std::pair<std::string, std::size_t>, std::vector<std::size_t>> publishers;
-    for (const std::size_t callback : callbacks) {
-      const CallbackRecord &record = recording.callbacks()[callback];
-      for (const auto &[topic, output] : record.outputs) publishers[{record.id.node, topic}].push_back(callback);
-    }
-    for (const auto &[key, members] : publishers) {
-      if (!is_round(members, key.second)) continue;
-      for (const std::size_t member : members) parents_[root(member)] = root(members.front());
-    }
-  }
-
-  std::size_t root(std::size_t callback) {
-    while (parents_[callback] != callback) callback = parents_[callback];
-    return callback;
-  }
-
- private:
-  [[nodiscard]] bool is_round(const std::vector<std::size_t> &members, std::size_t topic) const {
-    std::uint64_t messages = 0;
-    std::uint64_t rounds = UINT64_MAX;
-    std::size_t timers = 0;
-    for (const std::size_t member : members) {
-      const CallbackRecord &record = recording_.callbacks()[member];
-      messages += record.outputs.at(topic).messages;
-      rounds = std::min(rounds, record.runs);
-      if (record.id.kind == CallbackKind::Timer) ++timers;
-      if (record.id.kind == CallbackKind::Service || record.most_at_once > 1) return false;
-      for (const std::size_t other : members) {
-        if (record.overlaps.contains(other)) return false;
-      }
-    }
-    return members.size() > 1 && timers <= 1 && messages >= kFewestRuns && is_near(messages, rounds);
-  }
-
-  const Recording &recording_;
-  std::vector<std::size_t> parents_;
 };
 
 class Importing {
  public:
-  Importing(const Recording &recording, std::uint32_t process)
-      : recording_(recording), pid_(process), process_(recording.processes().at(process)) {}
+  Importing(const Recording &recording, std::uint32_t pid)
+      : callbacks_(recording.callbacks()), recording_(recording), pid_(pid), process_(recording.processes().at(pid)) {}
 
   ImportedWorkload run() {
-    make_units();
+    for (std::size_t i = 0; i < callbacks_.size(); ++i) {
+      for (const auto &[topic, output] : callbacks_[i].outputs) publishers_[topic].push_back(i);
+    }
+    make_units(usable_callbacks());
     for (std::size_t unit = 0; unit < units_.size(); ++unit) find_predecessors(unit);
-    break_cycles();
+    open_circles();
     make_dags();
-    assume_groups();
     describe();
     return std::move(result_);
   }
 
  private:
-  [[nodiscard]] const CallbackRecord &record(std::size_t callback) const { return recording_.callbacks()[callback]; }
-  [[nodiscard]] const CallbackRecord &first_of(const Unit &unit) const { return record(unit.members.front()); }
+  [[nodiscard]] const CallbackRecord &first_of(const Unit &unit) const { return callbacks_[unit.members.front()]; }
+  [[nodiscard]] bool is_timer(std::size_t callback) const {
+    return callbacks_[callback].id.kind == CallbackKind::Timer;
+  }
 
-  void make_units() {
-    std::vector<std::size_t> candidates;
+  // ---- callbacks ----
+
+  Positions usable_callbacks() {
+    Positions usable;
     std::size_t never = 0;
-    for (std::size_t i = 0; i < recording_.callbacks().size(); ++i) {
-      const CallbackRecord &callback = record(i);
+    for (std::size_t i = 0; i < callbacks_.size(); ++i) {
+      const CallbackRecord &callback = callbacks_[i];
       if (callback.process != pid_) continue;
       if (callback.id.kind == CallbackKind::Subscription) result_.messages += callback.runs;
-      const std::uint64_t ended = callback.quiet.size() + callback.publishing.size();
+      const bool is_slow = is_timer(i) && callback.id.period > (recording_.last() - callback.created) / 10;
+      std::string why;
+      if (callback.id.node.empty()) {
+        why = "its node is unknown: the recording began later";
+      } else if (callback.quiet.size() + callback.publishing.size() == 0) {
+        why = "no run of it ended";
+      } else if (callback.runs < kFewestRuns && !is_slow) {
+        why = fmt::format("ran {}: its rate is unknown", plural(callback.runs, "time"));
+      }
       if (callback.runs == 0) {
         if (!is_ros_internal(callback.id)) ++never;
-      } else if (ended == 0) {
-        leave_out(callback, "no run of it ended");
-      } else if (callback.id.node.empty()) {
-        leave_out(callback, "its node is unknown: the recording began later");
-      } else if (callback.runs < kFewestRuns &&
-                 (callback.id.kind != CallbackKind::Timer || !expires_rarely(callback))) {
-        leave_out(callback, fmt::format("ran {}: its rate is unknown", plural(callback.runs, "time")));
+      } else if (why.empty()) {
+        usable.push_back(i);
       } else {
-        candidates.push_back(i);
+        result_.left_out.push_back(fmt::format("{}: {}", to_string(callback.id), why));
       }
     }
     if (never > 0) result_.left_out.push_back(fmt::format("{} that never ran", plural(never, "callback")));
-    Joins joins(recording_, candidates);
-    std::map<std::size_t, std::size_t> unit_of_root;
-    for (const std::size_t callback : candidates) {
-      const auto [place, is_new] = unit_of_root.try_emplace(joins.root(callback), units_.size());
-      if (is_new) units_.emplace_back();
-      units_[place->second].members.push_back(callback);
-      unit_of_[callback] = place->second;
+    return usable;
+  }
+
+  /// True if these callbacks of a node can be one job: at most one timer, no service, and none beside another.
+  [[nodiscard]] bool can_be_one_job(const Positions &members) const {
+    const auto spoils = [&](std::size_t member) {
+      const CallbackRecord &callback = callbacks_[member];
+      return callback.id.kind == CallbackKind::Service || callback.most_at_once > 1 ||
+             std::any_of(members.begin(), members.end(), [&](auto other) { return callback.overlaps.contains(other); });
+    };
+    return members.size() > 1 && std::none_of(members.begin(), members.end(), spoils) &&
+           std::count_if(members.begin(), members.end(), [&](std::size_t i) { return is_timer(i); }) <= 1;
+  }
+
+  /// True if the callbacks store what they take until the last one of a round has it all, and publishes.
+  [[nodiscard]] bool publish_in_turn(const Positions &members, const std::string &topic) const {
+    std::uint64_t messages = 0;
+    std::uint64_t rounds = UINT64_MAX;
+    for (const std::size_t member : members) {
+      messages += callbacks_[member].outputs.at(topic).messages;
+      rounds = std::min(rounds, callbacks_[member].runs);
     }
-    for (Unit &unit : units_) {
-      std::stable_partition(unit.members.begin(), unit.members.end(),
-                            [&](std::size_t member) { return record(member).id.kind == CallbackKind::Timer; });
-      for (const std::size_t member : unit.members) {
-        const CallbackRecord &callback = record(member);
-        unit.execution.merge(callback.publishing);
-        if (unit.members.size() == 1) unit.execution.merge(callback.quiet);
-        result_.explained += callback.executed;
-      }
-      unit.runs = unit.execution.size();
-      if (unit.members.size() > 1) unit.notes.push_back(joined_note(unit));
+    return messages >= kFewestRuns && is_as_many(messages, rounds);
+  }
+
+  /// The same where nothing is published: one run of each round is long, and not always that of the same callback.
+  /// Returns what separates long runs from others; 0: it is not so.
+  [[nodiscard]] Duration work_in_turn(const Positions &members) const {
+    Duration shortest = kNever;
+    Duration longest = 0;
+    std::uint64_t rounds = UINT64_MAX;
+    for (const std::size_t member : members) {
+      const metrics::Distribution execution = callbacks_[member].quiet.distribution();
+      shortest = std::min(shortest, std::max<Duration>(execution.min, 1));
+      longest = std::max(longest, execution.max);
+      rounds = std::min(rounds, execution.count);
     }
-  }
-
-  void leave_out(const CallbackRecord &callback, const std::string &why) {
-    result_.left_out.push_back(fmt::format("{}: {}", to_string(callback.id), why));
-  }
-
-  [[nodiscard]] bool expires_rarely(const CallbackRecord &timer) const {
-    return timer.id.period > 0 && (recording_.last() - timer.created) / timer.id.period <= 10;
-  }
-
-  [[nodiscard]] std::string joined_note(const Unit &unit) const {
-    std::vector<std::string> names;
-    for (const std::size_t member : unit.members) {
-      const CallbackId &id = record(member).id;
-      names.push_back(id.kind == CallbackKind::Timer ? std::string("its timer") : id.name);
+    const auto limit = static_cast<Duration>(std::sqrt(static_cast<double>(shortest) * static_cast<double>(longest)));
+    std::uint64_t work = 0;
+    std::size_t changing = 0;
+    for (const std::size_t member : members) {
+      const std::uint64_t runs = callbacks_[member].quiet.size();
+      const std::uint64_t long_runs = longer_than(limit, callbacks_[member].quiet).size();
+      work += long_runs;
+      if (std::min(long_runs, runs - long_runs) >= kFewestRuns) ++changing;
+      if (!is_as_many(runs, rounds)) return 0;
     }
-    return fmt::format("one job of {}: the last of them publishes", join(names));
+    return changing >= 2 && is_as_many(work, rounds) && longest >= 10 * shortest ? limit : 0;
   }
 
-  // ---- edges ----
-
-  /// The callbacks of this process that publish to a topic, by unit, with their runs and messages.
-  [[nodiscard]] std::map<std::size_t, CallbackRecord::Output> publishers_of(std::size_t topic,
-                                                                            bool &from_others) const {
-    std::map<std::size_t, CallbackRecord::Output> result;
-    from_others = recording_.topics()[topic].outside > 0;
-    for (std::size_t i = 0; i < recording_.callbacks().size(); ++i) {
-      const auto output = record(i).outputs.find(topic);
-      if (output == record(i).outputs.end()) continue;
-      const auto unit = unit_of_.find(i);
-      if (record(i).process != pid_ || unit == unit_of_.end()) {
-        from_others = true;
-        continue;
-      }
-      result[unit->second].runs += output->second.runs;
-      result[unit->second].messages += output->second.messages;
+  static metrics::DurationSketch longer_than(Duration limit, const metrics::DurationSketch &all) {
+    metrics::DurationSketch result{1024};
+    const Duration longest = all.distribution().max;
+    for (const metrics::CountedDurations &range : all.counted()) {
+      for (std::uint64_t i = 0; range.low > limit && i < range.count; ++i) result.add(std::min(range.high, longest));
     }
     return result;
   }
 
-  /// Returns the unit whose every job sends the one message that this callback takes; otherwise says why there is none.
+  void make_units(const Positions &usable) {
+    Clusters jobs(callbacks_.size());
+    std::map<std::pair<std::string, std::string>, Positions> sets;  // by node, and topic that they publish to or ""
+    for (const std::size_t i : usable) {
+      for (const auto &[topic, output] : callbacks_[i].outputs) sets[{callbacks_[i].id.node, topic}].push_back(i);
+      if (callbacks_[i].outputs.empty() && !is_timer(i)) sets[{callbacks_[i].id.node, {}}].push_back(i);
+    }
+    std::map<std::size_t, Duration> limits;  // of jobs that publish nothing
+    for (const auto &[key, members] : sets) {
+      const std::string &topic = key.second;
+      if (!can_be_one_job(members) || (!topic.empty() && !publish_in_turn(members, topic))) continue;
+      if (topic.empty() && (limits[members.front()] = work_in_turn(members)) == 0) continue;
+      for (const std::size_t member : members) jobs.join(members.front(), member);
+    }
+    std::map<std::size_t, std::size_t> units;
+    for (const std::size_t callback : usable) {
+      const auto [unit, is_new] = units.try_emplace(jobs.first(callback), units_.size());
+      if (is_new) units_.emplace_back();
+      units_[unit->second].members.push_back(callback);
+      unit_of_[callback] = unit->second;
+    }
+    for (Unit &unit : units_) {
+      std::stable_partition(unit.members.begin(), unit.members.end(), [&](std::size_t i) { return is_timer(i); });
+      std::vector<std::string> names;
+      for (const std::size_t member : unit.members) {
+        const CallbackRecord &callback = callbacks_[member];
+        unit.execution.merge(callback.publishing);
+        if (unit.members.size() == 1) unit.execution.merge(callback.quiet);
+        if (const Duration limit = limits[unit.members.front()]; limit > 0) {
+          unit.execution.merge(longer_than(limit, callback.quiet));
+        }
+        result_.explained += callback.executed;
+        names.push_back(is_timer(member) ? "its timer" : callback.id.name);
+      }
+      const metrics::Distribution execution = unit.execution.distribution();
+      unit.notes.push_back(fmt::format("wcet: the longest of {}; median {}, 99 % within {}",
+                                       plural(execution.count, "run"), humanize_duration(execution.p50),
+                                       humanize_duration(execution.p99)));
+      if (names.size() > 1)
+        unit.notes.push_back(fmt::format("one job of {}: the last of a round does it", join(names)));
+    }
+  }
+
+  // ---- edges ----
+
+  /// Returns the unit whose every job sends the one message that this callback takes. Otherwise notes why there is
+  /// none.
   std::optional<std::size_t> sender_of(const CallbackRecord &taker, std::vector<std::string> &notes) const {
-    const std::optional<std::size_t> topic = recording_.find_topic(taker.id.name);
-    bool from_others = false;
-    const auto publishers =
-        topic ? publishers_of(*topic, from_others) : std::map<std::size_t, CallbackRecord::Output>();
-    if (publishers.empty()) {
-      const bool hidden = taker.intra_process > 0 && !from_others;
-      notes.push_back(hidden ? taker.id.name + " came intra-process from an unknown callback: no event says who sent it"
-                             : taker.id.name + " comes from outside of the callbacks of this process");
+    const std::string &topic = taker.id.name;
+    std::map<std::size_t, Output> senders;
+    bool others = recording_.is_sent_elsewhere(topic);
+    if (const auto publishers = publishers_.find(topic); publishers != publishers_.end()) {
+      for (const std::size_t i : publishers->second) {
+        const auto unit = unit_of_.find(i);
+        if (unit == unit_of_.end()) {
+          others = true;
+          continue;
+        }
+        senders[unit->second].runs += callbacks_[i].outputs.at(topic).runs;
+        senders[unit->second].messages += callbacks_[i].outputs.at(topic).messages;
+      }
+    }
+    if (senders.empty()) {
+      notes.push_back(taker.takes_directly && !others
+                          ? topic + " came from an unknown callback of this process: no event says who sent it"
+                          : topic + " comes from outside of the callbacks of this process");
       return std::nullopt;
     }
-    const auto &[unit, output] = *publishers.begin();
-    const Unit &sender = units_[unit];
-    const std::string name = to_string(first_of(sender).id);
-    if (publishers.size() > 1 || from_others) {
-      notes.push_back(
-          fmt::format("{} has several publishers, {} among them: each message is one job", taker.id.name, name));
-    } else if (static_cast<double>(output.runs) < kAll * static_cast<double>(sender.runs) - 2) {
-      notes.push_back(fmt::format("{} publishes {} in {} of {} runs: a rate of its own", name, taker.id.name,
-                                  output.runs, sender.runs));
-    } else if (!is_near(output.messages, output.runs)) {
-      notes.push_back(fmt::format("{} publishes {} {} times in {} runs: a rate of its own", name, taker.id.name,
-                                  output.messages, output.runs));
-    } else if (static_cast<double>(taker.runs) < kLeast * static_cast<double>(output.messages) - 2) {
-      notes.push_back(
-          fmt::format("took {} of {} messages of {}: a rate of its own", taker.runs, output.messages, name));
-    } else {
-      if (!is_near(taker.runs, output.messages)) {
-        notes.push_back(fmt::format("took {} of {} messages of {}", taker.runs, output.messages, name));
+    const auto &[unit, output] = *senders.begin();
+    const std::string name = to_string(first_of(units_[unit]).id);
+    std::string why;
+    if (senders.size() > 1 || others) {
+      why = fmt::format("{} has several publishers, {} among them: each message is one job", topic, name);
+    } else if (const std::uint64_t runs = units_[unit].execution.size();
+               !is_at_least(output.runs, kAll, runs) || !is_as_many(output.messages, output.runs)) {
+      why = fmt::format("{} publishes {} {} times in {} runs: a rate of its own", name, topic, output.messages, runs);
+    } else if (!is_as_many(taker.runs, output.messages)) {
+      why = fmt::format("took {} of {} messages of {}", taker.runs, output.messages, name);
+      if (is_at_least(taker.runs, kMost, output.messages)) {
+        notes.push_back(why);
+        return unit;
       }
+    } else {
       return unit;
     }
+    notes.push_back(why);
     return std::nullopt;
   }
 
   void find_predecessors(std::size_t position) {
     Unit &unit = units_[position];
-    std::vector<std::string> notes;
+    std::size_t known = 0;
+    std::size_t inputs = 0;
     for (const std::size_t member : unit.members) {
-      const CallbackRecord &callback = record(member);
-      if (callback.id.kind != CallbackKind::Subscription) continue;
-      const std::optional<std::size_t> sender = sender_of(callback, notes);
+      if (callbacks_[member].id.kind != CallbackKind::Subscription) continue;
+      ++inputs;
+      const std::optional<std::size_t> sender = sender_of(callbacks_[member], unit.notes);
       if (!sender || *sender == position) continue;
+      ++known;
       if (std::find(unit.predecessors.begin(), unit.predecessors.end(), *sender) == unit.predecessors.end()) {
         unit.predecessors.push_back(*sender);
       }
     }
-    const bool is_timer = first_of(unit).id.kind == CallbackKind::Timer;
-    unit.is_source = is_timer || unit.predecessors.empty();
-    if (!notes.empty() && !unit.predecessors.empty())
-      notes.emplace_back("unknown to the model: that it waits for this, too");
-    unit.notes.insert(unit.notes.end(), notes.begin(), notes.end());
+    if (known > 0 && known < inputs) unit.notes.emplace_back("unknown to the model: that it waits for the others, too");
   }
 
-  void break_cycles() {
+  void open_circles() {
     std::vector<bool> done(units_.size(), false);
     for (std::size_t left = units_.size(); left > 0;) {
       const std::size_t before = left;
       std::optional<std::size_t> earliest;
       for (std::size_t i = 0; i < units_.size(); ++i) {
         if (done[i]) continue;
-        const auto &from = units_[i].predecessors;
+        const Positions &from = units_[i].predecessors;
         if (std::all_of(from.begin(), from.end(), [&](std::size_t p) { return bool{done[p]}; })) {
           done[i] = true;
           --left;
@@ -260,55 +292,11 @@ class Importing {
       }
       if (left != before || !earliest) continue;
       units_[*earliest].predecessors.clear();
-      units_[*earliest].is_source = true;
       units_[*earliest].notes.emplace_back("its messages come around in a circle, which begins here in the model");
     }
   }
 
   // ---- tasks ----
-
-  void make_dags() {
-    std::vector<std::size_t> component(units_.size());
-    std::iota(component.begin(), component.end(), 0);
-    const auto root = [&](std::size_t unit) {
-      while (component[unit] != unit) unit = component[unit];
-      return unit;
-    };
-    for (std::size_t i = 0; i < units_.size(); ++i) {
-      for (const std::size_t p : units_[i].predecessors)
-        component[std::max(root(i), root(p))] = std::min(root(i), root(p));
-    }
-    Workload &workload = result_.workload;
-    workload.name = process_.program.empty() ? "imported" : process_.program;
-    workload.platform.workers =
-        std::max<std::uint32_t>(static_cast<std::uint32_t>(process_.executor_threads.size()), 1);
-    std::set<std::string> dag_names;
-    std::set<std::string> task_names;
-    for (std::size_t first = 0; first < units_.size(); ++first) {
-      if (root(first) != first) continue;
-      Dag dag;
-      dag.edges = Edges::Seen;
-      std::vector<std::size_t> members;
-      for (std::size_t i = first; i < units_.size(); ++i) {
-        if (root(i) == first) members.push_back(i);
-      }
-      const auto source =
-          *std::find_if(members.begin(), members.end(), [&](std::size_t i) { return units_[i].predecessors.empty(); });
-      dag.name = unique(first_of(units_[source]).id.node.substr(1), dag_names);
-      for (const std::size_t i : members) {
-        dag.tasks.push_back(make_task(units_[i]));
-        dag.tasks.back().name = unique(dag.tasks.back().name, task_names);
-        for (const std::size_t p : units_[i].predecessors) {
-          const auto at = std::find(members.begin(), members.end(), p) - members.begin();
-          dag.tasks.back().predecessors.push_back(static_cast<std::uint32_t>(at));
-        }
-        order_.push_back(i);
-        result_.notes.push_back(units_[i].notes);
-      }
-      inherit_periods(dag);
-      workload.dags.push_back(std::move(dag));
-    }
-  }
 
   static std::string unique(const std::string &wanted, std::set<std::string> &taken) {
     std::string name = wanted;
@@ -316,39 +304,76 @@ class Importing {
     return name;
   }
 
-  Task make_task(Unit &unit) {
+  void make_dags() {
+    Clusters dags(units_.size());
+    for (std::size_t i = 0; i < units_.size(); ++i) {
+      for (const std::size_t p : units_[i].predecessors) dags.join(i, p);
+    }
+    Workload &workload = result_.workload;
+    workload.name = process_.program.empty() ? "imported" : process_.program;
+    workload.platform.workers = static_cast<std::uint32_t>(std::max<std::size_t>(process_.executor_threads.size(), 1));
+    std::map<std::string, std::vector<Positions>> groups;  // of each node
+    std::set<std::string> names;
+    for (std::size_t first = 0; first < units_.size(); ++first) {
+      if (dags.first(first) != first) continue;
+      Positions members;
+      for (std::size_t i = first; i < units_.size(); ++i) {
+        if (dags.first(i) == first) members.push_back(i);
+      }
+      const std::size_t source =
+          *std::find_if(members.begin(), members.end(), [&](std::size_t i) { return units_[i].predecessors.empty(); });
+      Dag dag;
+      dag.name = unique(first_of(units_[source]).id.node.substr(1), names);
+      dag.edges = Edges::Seen;
+      for (const std::size_t i : members) {
+        Task task = make_task(units_[i]);
+        task.name = unique(task.name, names);
+        for (const std::size_t p : units_[i].predecessors) {
+          const auto at = std::find(members.begin(), members.end(), p) - members.begin();
+          task.predecessors.push_back(static_cast<std::uint32_t>(at));
+        }
+        if (task.concurrency == 1) task.group = group_of(i, groups[first_of(units_[i]).id.node]);
+        dag.tasks.push_back(std::move(task));
+        result_.notes.push_back(units_[i].notes);
+      }
+      inherit_periods(dag);
+      workload.dags.push_back(std::move(dag));
+    }
+    drop_small_groups();
+  }
+
+  Task make_task(Unit &unit) const {
     const CallbackRecord &first = first_of(unit);
+    const bool timer = is_timer(unit.members.front());
     Task task;
     task.name = to_string(first.id);
-    set_execution(task, unit);
-    const bool is_timer = first.id.kind == CallbackKind::Timer;
+    set_execution(task, unit.execution);
     task.callback = Callback{.node = first.id.node,
                              .kind = first.id.kind,
                              .name = first.id.name,
                              .period = first.id.period,
-                             .index = is_timer ? std::optional(first.id.index) : std::nullopt};
-    if (!unit.is_source) {
-      task.activation = Activation::Data;
-    } else if (is_timer) {
+                             .index = timer ? std::optional(first.id.index) : std::nullopt};
+    if (timer) {
       task.period = timer_period(first, unit.notes);
       task.phase = Phase::Unknown;
+    } else if (!unit.predecessors.empty()) {
+      task.activation = Activation::Data;
     } else {
       const bool are_sent = first.sent.size() == first.begun.size();
       const Arrivals arrivals = estimate_arrivals(are_sent ? first.sent : first.begun);
       task.period = arrivals.period;
-      task.jitter = arrivals.jitter;
       task.phase = arrivals.sporadic || first.id.kind == CallbackKind::Service ? Phase::Event : Phase::Unknown;
-      if (task.phase == Phase::Event) task.jitter = 0;
+      if (task.phase != Phase::Event) task.jitter = arrivals.jitter;
       unit.notes.push_back(fmt::format("period and jitter as seen in {} {}{}{}", first.begun.size(),
                                        are_sent ? "messages, by when they were sent" : "runs, by their begin",
                                        arrivals.note.empty() ? "" : "; ", arrivals.note));
     }
     task.deadline = task.period;
-    if (unit.members.size() == 1 && first.most_at_once > 1) task.concurrency = first.most_at_once;
+    if (unit.members.size() == 1) task.concurrency = first.most_at_once;
     return task;
   }
 
-  Duration timer_period(const CallbackRecord &timer, std::vector<std::string> &notes) const {
+  static Duration timer_period(const CallbackRecord &timer, std::vector<std::string> &notes) {
     const Duration stated = std::max<Duration>(timer.id.period, 1);
     if (timer.runs < 10) return stated;
     const Duration seen = (timer.last_start - timer.first_start) / static_cast<Duration>(timer.runs - 1);
@@ -357,31 +382,27 @@ class Importing {
     notes.push_back(fmt::format("ran every {} on average; unknown: {}", humanize_duration(seen),
                                 ratio < 1 ? "the clock of its period, so this is the period here"
                                           : "whether it was late, cancelled at times, or on another clock"));
-    return ratio < 1 ? seen : stated;
+    return ratio < 1 ? std::max<Duration>(seen, 1) : stated;
   }
 
-  void set_execution(Task &task, Unit &unit) const {
-    const metrics::Distribution execution = unit.execution.distribution();
+  static void set_execution(Task &task, const metrics::DurationSketch &seen) {
+    const metrics::Distribution execution = seen.distribution();
     task.wcet = std::max<Duration>(execution.max, 1);
-    task.bcet = std::min(std::max<Duration>(execution.min, 0), task.wcet);
-    unit.notes.insert(unit.notes.begin(),
-                      fmt::format("wcet: the longest of {}; median {}, 99 % within {}", plural(execution.count, "run"),
-                                  humanize_duration(execution.p50), humanize_duration(execution.p99)));
+    task.bcet = std::clamp<Duration>(execution.min, 0, task.wcet);
     if (execution.count < kQuantiles || task.bcet == task.wcet) {
       task.execution.kind = task.bcet > 0 ? ExecutionTime::Kind::Uniform : ExecutionTime::Kind::Constant;
       return;
     }
     task.execution.kind = ExecutionTime::Kind::Empirical;
-    std::uint64_t seen = 0;
     const Duration digit = std::max<Duration>(task.wcet / 2000, 1);  // no more digits than the measurement has
-    for (const metrics::CountedDurations &range : unit.execution.counted()) {
-      seen += range.count;
-      // Quantile i stands for the i-th of twenty equal shares: it is that share's middle.
-      while (task.execution.samples.size() < kQuantiles &&
-             static_cast<double>(seen) * 2 * kQuantiles >=
-                 static_cast<double>(execution.count) * static_cast<double>(2 * task.execution.samples.size() + 1)) {
+    std::uint64_t so_far = 0;
+    std::vector<Duration> &samples = task.execution.samples;
+    for (const metrics::CountedDurations &range : seen.counted()) {
+      so_far += range.count;
+      // A sample is the middle of one of twenty equal shares.
+      while (samples.size() < kQuantiles && so_far * 2 * kQuantiles >= execution.count * (2 * samples.size() + 1)) {
         const Duration middle = range.low + (range.high - range.low) / 2;
-        task.execution.samples.push_back(
+        samples.push_back(
             std::clamp((middle + digit / 2) / digit * digit, std::max<Duration>(task.bcet, 1), task.wcet));
       }
     }
@@ -389,35 +410,35 @@ class Importing {
 
   // ---- what the recording does not say ----
 
-  /// Two callbacks that ran at once are in no common group. All others of a node can be in its default one.
-  void assume_groups() {
-    std::map<std::string, std::vector<std::vector<std::size_t>>> groups;  // of each node: units
-    const auto overlap = [&](std::size_t a, std::size_t b) {
-      return std::any_of(units_[a].members.begin(), units_[a].members.end(), [&](std::size_t member) {
-        return std::any_of(units_[b].members.begin(), units_[b].members.end(),
-                           [&](std::size_t other) { return record(member).overlaps.contains(other); });
-      });
+  /// Returns the first group of its node in which no callback ran at the same time as one of the unit, and adds it.
+  std::string group_of(std::size_t unit, std::vector<Positions> &groups) const {
+    const std::string &node = first_of(units_[unit]).id.node;
+    const auto overlaps = [&](std::size_t other) {
+      for (const std::size_t member : units_[unit].members) {
+        for (const std::size_t beside : units_[other].members) {
+          if (callbacks_[member].overlaps.contains(beside)) return true;
+        }
+      }
+      return false;
     };
-    std::vector<Task *> tasks(units_.size());
-    std::size_t next = 0;
+    auto group = std::find_if(groups.begin(), groups.end(), [&](const Positions &members) {
+      return std::none_of(members.begin(), members.end(), overlaps);
+    });
+    if (group == groups.end()) group = groups.insert(group, Positions());
+    group->push_back(unit);
+    return group == groups.begin() ? node : fmt::format("{} {}", node, group - groups.begin() + 1);
+  }
+
+  void drop_small_groups() {
+    std::map<std::string, std::size_t> sizes;
     for (Dag &dag : result_.workload.dags) {
-      for (Task &task : dag.tasks) tasks[order_[next++]] = &task;
+      for (const Task &task : dag.tasks) ++sizes[task.group];
     }
     bool some = false;
-    for (std::size_t i = 0; i < units_.size(); ++i) {
-      if (tasks[i]->concurrency > 1) continue;
-      auto &of_node = groups[first_of(units_[i]).id.node];
-      auto fits = std::find_if(of_node.begin(), of_node.end(), [&](const std::vector<std::size_t> &group) {
-        return std::none_of(group.begin(), group.end(), [&](std::size_t other) { return overlap(i, other); });
-      });
-      if (fits == of_node.end()) fits = of_node.insert(fits, std::vector<std::size_t>());
-      fits->push_back(i);
-    }
-    for (const auto &[node, of_node] : groups) {
-      for (std::size_t n = 0; n < of_node.size(); ++n) {
-        if (of_node[n].size() < 2) continue;
-        some = true;
-        for (const std::size_t i : of_node[n]) tasks[i]->group = n == 0 ? node : fmt::format("{} {}", node, n + 1);
+    for (Dag &dag : result_.workload.dags) {
+      for (Task &task : dag.tasks) {
+        if (sizes[task.group] == 1) task.group.clear();
+        some = some || !task.group.empty();
       }
     }
     if (some) {
@@ -428,108 +449,77 @@ class Importing {
   }
 
   void describe() {
-    for (std::size_t i = 0; i < units_.size(); ++i) {
-      for (const std::size_t member : units_[i].members) {
-        if (record(member).id.kind != CallbackKind::Subscription) continue;
-        (units_[i].predecessors.empty() ? result_.as_sources : result_.over_edges) += record(member).runs;
+    for (const Unit &unit : units_) {
+      for (const std::size_t member : unit.members) {
+        if (callbacks_[member].id.kind != CallbackKind::Subscription) continue;
+        (unit.predecessors.empty() ? result_.as_sources : result_.over_edges) += callbacks_[member].runs;
       }
     }
     result_.executed = process_.executed;
-    std::vector<std::string> remarks;
-    remarks.push_back(
-        fmt::format("{} in {}, on {} of the {} of executors. 'workers' counts the latter.",
-                    plural(process_.runs, "run"), humanize_duration(recording_.last() - recording_.first()),
-                    plural(process_.threads.size(), "thread"), plural(process_.executor_threads.size(), "thread")));
-    remarks.push_back(process_.has_switches
-                          ? "Execution is processor time, by the kernel's sched_switch."
-                          : "Execution is wall time, with preemption and waits: no sched_switch names these threads.");
-    remarks.push_back(
-        fmt::format("The tasks stand for {} of the time in callbacks. Of {}, {} came over edges, {} to "
-                    "sources with rates of their own.",
-                    format_percent(share(result_.explained, result_.executed)), plural(result_.messages, "message"),
-                    format_percent(share(result_.over_edges, result_.messages)),
-                    format_percent(share(result_.as_sources, result_.messages))));
+    const auto remark = [&](std::string text) { result_.remarks.push_back(std::move(text)); };
+    remark(fmt::format("{} in {}, on {} of {}, which 'workers' counts.", plural(process_.runs, "run"),
+                       humanize_duration(recording_.last() - recording_.first()), process_.threads.size(),
+                       plural(process_.executor_threads.size(), "thread of executors", "threads of executors")));
+    remark(process_.has_switches
+               ? "Execution is processor time, by the kernel's sched_switch."
+               : "Execution is wall time, with preemption and waits: no sched_switch names these threads.");
+    remark(fmt::format(
+        "The tasks stand for {} of the time in callbacks. Of {}, {} came over edges, {} to sources with "
+        "rates of their own.",
+        share_of(static_cast<std::uint64_t>(result_.explained), static_cast<std::uint64_t>(result_.executed)),
+        plural(result_.messages, "message"), share_of(result_.over_edges, result_.messages),
+        share_of(result_.as_sources, result_.messages)));
     if (process_.unknown_runs > 0) {
-      remarks.push_back(fmt::format("unknown: {} of callbacks whose creation was not recorded ({} in them).",
-                                    plural(process_.unknown_runs, "run"),
-                                    humanize_duration(process_.unknown_executed)));
+      remark(fmt::format("unknown: {} of callbacks whose creation was not recorded.",
+                         plural(process_.unknown_runs, "run")));
     }
     if (process_.torn_runs > 0) {
-      remarks.push_back(
-          fmt::format("unknown: {} whose begin or end was not recorded.", plural(process_.torn_runs, "run")));
+      remark(fmt::format("unknown: {} whose begin or end was not recorded.", plural(process_.torn_runs, "run")));
     }
-    if (recording_.disordered() > 0) {
-      remarks.push_back(
-          fmt::format("unknown: {} earlier than the one before.", plural(recording_.disordered(), "event")));
-    }
-    remarks.emplace_back(
-        "unknown: which executor a callback belongs to, and clients' callbacks, which leave no events.");
-    result_.remarks.insert(result_.remarks.begin(), remarks.begin(), remarks.end());
+    remark("unknown: which executor a callback belongs to, and clients' callbacks, which leave no events.");
   }
 
-  static double share(std::int64_t part, std::int64_t whole) {
-    return whole == 0 ? std::nan("") : static_cast<double>(part) / static_cast<double>(whole);
-  }
-  static double share(std::uint64_t part, std::uint64_t whole) {
-    return share(static_cast<std::int64_t>(part), static_cast<std::int64_t>(whole));
-  }
-
+  const std::vector<CallbackRecord> &callbacks_;
   const Recording &recording_;
   std::uint32_t pid_;
   const ProcessRecord &process_;
+  std::map<std::string, Positions> publishers_;  // of topics: callbacks
   std::vector<Unit> units_;
   std::map<std::size_t, std::size_t> unit_of_;
-  std::vector<std::size_t> order_;  // units by TaskId
   ImportedWorkload result_;
 };
 
 }  // namespace
 
-std::vector<std::uint32_t> processes_with_callbacks(const Recording &recording) {
-  std::vector<std::pair<Duration, std::uint32_t>> busy;
-  for (const auto &[id, process] : recording.processes()) {
-    if (process.runs > 0) busy.emplace_back(-process.executed, id);
-  }
-  std::sort(busy.begin(), busy.end());
-  std::vector<std::uint32_t> result;
-  for (const auto &[executed, id] : busy) result.push_back(id);
-  return result;
-}
-
 Result<ImportedWorkload> import_workload(const Recording &recording, std::uint32_t process) {
   ImportedWorkload imported = Importing(recording, process).run();
-  if (!imported.workload.dags.empty()) {
-    Diagnostics mistakes = validate(imported.workload);
-    if (has_errors(mistakes))
-      return tl::unexpected<Diagnostics>(std::move(mistakes));  // such as a name with a line feed
-    return imported;
+  if (imported.workload.dags.empty()) {
+    return make_error(imported.left_out.empty() ? "none of its callbacks was seen to be created"
+                                                : "no callback makes a task: " + imported.left_out.front(),
+                      "record from before the nodes start, and for longer");
   }
-  if (imported.left_out.empty()) {
-    return make_error(fmt::format("none of the callbacks of process {} was seen to be created", process),
-                      "start the recording before the nodes");
-  }
-  return make_error(
-      fmt::format("process {} has no callback that makes a task: {}", process, imported.left_out.front()));
+  Diagnostics mistakes = validate(imported.workload);  // such as a name with a line feed
+  if (has_errors(mistakes)) return tl::unexpected<Diagnostics>(std::move(mistakes));
+  return imported;
 }
 
 std::string to_yaml(const ImportedWorkload &imported) {
   std::string text;
   const auto comment = [&](std::string line, std::size_t indent) {
-    std::replace_if(
-        line.begin(), line.end(), [](char c) { return c == '\n' || c == '\t'; }, ' ');
+    std::replace(line.begin(), line.end(), '\n', ' ');
     const std::string begin = std::string(indent, ' ') + "# ";
     for (const std::string &part : lines_within(printable(line), kColumns - begin.size())) text += begin + part + "\n";
   };
   for (const std::string &remark : imported.remarks) comment(remark, 0);
   for (const std::string &line : imported.left_out) comment("left out: " + line, 0);
   const std::string plain = redag::to_yaml(imported.workload);
-  std::size_t task = 0;
+  auto notes = imported.notes.begin();
   for (std::size_t at = 0; at < plain.size();) {
     const std::size_t end = plain.find('\n', at) + 1;
     const std::string_view line = std::string_view(plain).substr(at, end - at);
     const std::size_t indent = line.find_first_not_of(' ');
-    if (line.substr(indent, 8) == "- {name:" && task < imported.notes.size()) {
-      for (const std::string &note : imported.notes[task++]) comment(note, indent);
+    if (line.substr(indent, 8) == "- {name:" && notes != imported.notes.end()) {
+      for (const std::string &note : *notes++) comment(note, indent);
     }
     text += line;
     at = end;

@@ -20,7 +20,7 @@ struct ImportedWorkload {
   std::vector<std::vector<std::string>> notes;  // by TaskId
   std::vector<std::string> remarks;             // about all of it
   std::vector<std::string> left_out;            // callbacks without a task, with the reason
-  /// How much of what the process did the tasks stand for.
+  // How much of what the process did the tasks stand for.
   Duration executed = 0;  // of all callbacks
   Duration explained = 0;
   std::uint64_t messages = 0;    // that callbacks took
@@ -36,16 +36,14 @@ struct Arrivals {
   std::string note;
 };
 
-/// Estimates how often something comes, from at least three instants in any order.
+/// Estimates how often something comes. Requires at least three instants, in any order.
 [[nodiscard]] Arrivals estimate_arrivals(std::vector<Time> instants);
 
-/// Returns the processes that ran callbacks, busiest first.
-[[nodiscard]] std::vector<std::uint32_t> processes_with_callbacks(const Recording &recording);
-
-/// Makes the workload of a process. Error: it ran no callback that was seen to be created.
+/// Makes the workload of a process. Errors: it ran no callback that was seen to be created, or a name is unfit for a
+/// file.
 [[nodiscard]] Result<ImportedWorkload> import_workload(const Recording &recording, std::uint32_t process);
 
-/// Writes the workload with its notes as comments. Every text that is not known has the word "unknown".
+/// Writes the workload with its notes as comments. Every one of something that is not known has the word "unknown".
 [[nodiscard]] std::string to_yaml(const ImportedWorkload &imported);
 
 }  // namespace redag::lab

@@ -3,9 +3,9 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <memory>
 
+#include "redag/base/text.hpp"
 #include "redag/base/words.hpp"
 #include "redag/loader/provenance.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
@@ -25,27 +25,24 @@ struct ImportOptions {
 };
 
 // Returns the one process to import. Otherwise prints which there are.
-std::optional<std::uint32_t> choose_process(const lab::Recording &recording, const ImportOptions &options,
+std::optional<std::uint32_t> choose_process(const lab::Recording &recording, const std::string &wanted,
                                             Console &console) {
-  const std::vector<std::uint32_t> all = lab::processes_with_callbacks(recording);
   std::vector<std::uint32_t> chosen;
   std::vector<std::string> names;
-  for (const std::uint32_t process : all) {
-    const lab::ProcessRecord &record = recording.processes().at(process);
+  for (const auto &[process, record] : recording.processes()) {
+    if (record.runs == 0) continue;
     names.push_back(fmt::format("{} ({}, {})", process, record.program, plural(record.runs, "run")));
-    if (options.process.empty() || options.process == std::to_string(process) || options.process == record.program) {
-      chosen.push_back(process);
-    }
+    if (wanted.empty() || wanted == std::to_string(process) || wanted == record.program) chosen.push_back(process);
   }
   if (chosen.size() == 1) return chosen.front();
-  if (all.empty()) {
+  if (names.empty()) {
     console.error("the recording has no run of a callback", recording.events() == 0
                                                                 ? "record the events 'ros2:*', as `ros2 trace` does"
                                                                 : "let the nodes run while it records");
   } else if (chosen.empty()) {
-    console.error(fmt::format("--process: {} ran no callback; these did: {}", options.process, join(names)));
+    console.error(fmt::format("--process: {} ran no callback; these did: {}", in_quotes(wanted), join(names)));
   } else {
-    console.error(fmt::format("several processes ran callbacks: {}", join(names)), "choose one with --process");
+    console.error("several processes ran callbacks: " + join(names), "choose one with --process");
   }
   return std::nullopt;
 }
@@ -84,7 +81,7 @@ int import_trace(const ImportOptions &options, Console &console) {
     console.note(read.error());
     return kExitBad;
   }
-  const std::optional<std::uint32_t> process = choose_process(recording, options, console);
+  const std::optional<std::uint32_t> process = choose_process(recording, options.process, console);
   if (!process) return kExitBad;
   Result<lab::ImportedWorkload> imported = lab::import_workload(recording, *process);
   if (!imported) {
