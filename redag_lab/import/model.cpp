@@ -56,6 +56,7 @@ class Clusters {
 struct Unit {
   Positions members;  // in Recording::callbacks(); a timer is first
   metrics::DurationSketch execution{1024};
+  metrics::DurationSketch response{1024};
   Positions predecessors;  // units
   std::vector<std::string> notes;
 };
@@ -96,7 +97,7 @@ class Importing {
       std::string why;
       if (callback.id.node.empty()) {
         why = "its node is unknown: the recording began later";
-      } else if (callback.quiet.size() + callback.publishing.size() == 0) {
+      } else if (callback.quiet.execution.size() + callback.publishing.execution.size() == 0) {
         why = "no run of it ended";
       } else if (callback.runs < kFewestRuns && !is_slow) {
         why = fmt::format("ran {}: its rate is unknown", plural(callback.runs, "time"));
@@ -142,7 +143,7 @@ class Importing {
     Duration longest = 0;
     std::uint64_t rounds = UINT64_MAX;
     for (const std::size_t member : members) {
-      const metrics::Distribution execution = callbacks_[member].quiet.distribution();
+      const metrics::Distribution execution = callbacks_[member].quiet.execution.distribution();
       shortest = std::min(shortest, std::max<Duration>(execution.min, 1));
       longest = std::max(longest, execution.max);
       rounds = std::min(rounds, execution.count);
@@ -151,8 +152,8 @@ class Importing {
     std::uint64_t work = 0;
     std::size_t changing = 0;
     for (const std::size_t member : members) {
-      const std::uint64_t runs = callbacks_[member].quiet.size();
-      const std::uint64_t long_runs = longer_than(limit, callbacks_[member].quiet).size();
+      const std::uint64_t runs = callbacks_[member].quiet.execution.size();
+      const std::uint64_t long_runs = longer_than(limit, callbacks_[member].quiet.execution).size();
       work += long_runs;
       if (std::min(long_runs, runs - long_runs) >= kFewestRuns) ++changing;
       if (!is_as_many(runs, rounds)) return 0;
@@ -195,10 +196,14 @@ class Importing {
       std::vector<std::string> names;
       for (const std::size_t member : unit.members) {
         const CallbackRecord &callback = callbacks_[member];
-        unit.execution.merge(callback.publishing);
-        if (unit.members.size() == 1) unit.execution.merge(callback.quiet);
+        unit.execution.merge(callback.publishing.execution);
+        unit.response.merge(callback.publishing.response);
+        if (unit.members.size() == 1) {
+          unit.execution.merge(callback.quiet.execution);
+          unit.response.merge(callback.quiet.response);
+        }
         if (const Duration limit = limits[unit.members.front()]; limit > 0) {
-          unit.execution.merge(longer_than(limit, callback.quiet));
+          unit.execution.merge(longer_than(limit, callback.quiet.execution));
         }
         result_.explained += callback.executed;
         names.push_back(is_timer(member) ? "its timer" : callback.id.name);
@@ -333,8 +338,12 @@ class Importing {
           task.predecessors.push_back(static_cast<std::uint32_t>(at));
         }
         if (task.concurrency == 1) task.group = group_of(i, groups[first_of(units_[i]).id.node]);
-        dag.tasks.push_back(std::move(task));
+        const CallbackRecord &callback = first_of(units_[i]);
+        const Time begin = callback.id.period > 0 ? callback.created : callback.begun.front();
+        result_.phases.push_back(task.activation == Activation::Data ? 0 : (begin - recording_.first()) % task.period);
+        result_.responses.push_back(units_[i].response.distribution());
         result_.notes.push_back(units_[i].notes);
+        dag.tasks.push_back(std::move(task));
       }
       inherit_periods(dag);
       workload.dags.push_back(std::move(dag));
@@ -456,6 +465,7 @@ class Importing {
       }
     }
     result_.executed = process_.executed;
+    result_.length = recording_.last() - recording_.first();
     const auto remark = [&](std::string text) { result_.remarks.push_back(std::move(text)); };
     remark(fmt::format("{} in {}, on {} of {}, which 'workers' counts.", plural(process_.runs, "run"),
                        humanize_duration(recording_.last() - recording_.first()), process_.threads.size(),

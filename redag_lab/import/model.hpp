@@ -26,6 +26,10 @@ struct ImportedWorkload {
   std::uint64_t messages = 0;    // that callbacks took
   std::uint64_t over_edges = 0;  // of these, with an edge from the task that sent them
   std::uint64_t as_sources = 0;  // of these, to tasks with a rate of their own
+  // What the simulation of the recorded run needs, by TaskId.
+  std::vector<Duration> phases;
+  std::vector<metrics::Distribution> responses;  // without values where no event says when a job was released
+  Duration length = 0;                           // of the recording
 };
 
 /// How the messages or requests of a source come.

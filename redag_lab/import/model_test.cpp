@@ -11,6 +11,7 @@
 #include <set>
 
 #include "redag/loader/workload_yaml.hpp"
+#include "redag_lab/import/self_check.hpp"
 #include "redag_lab/run/session.hpp"
 #include "redag_lab/run/variant.hpp"
 #include "redag_lab/workload/generate.hpp"
@@ -554,7 +555,7 @@ TEST(Arrivals, AtOneInstant) { EXPECT_EQ(estimate_arrivals({5, 5, 5}).period, 1)
 // messages from outside instead.
 class SimulatedNodes {
  public:
-  SimulatedNodes(const Workload &workload, Recording &recording) : nodes_(recording) {
+  SimulatedNodes(const Workload &workload, Recording &recording, bool some_outside = true) : nodes_(recording) {
     for (const TaskRef &ref : flatten(workload)) {
       Node &node = tasks_.emplace_back();
       node.name = name_of(ref.id);
@@ -563,11 +564,13 @@ class SimulatedNodes {
       for (const std::uint32_t p : ref.task->predecessors) {
         node.inputs.emplace_back(first + p, nodes_.subscription(handle, "/" + name_of(TaskId(first + p)) + "/out"));
       }
-      node.is_outside = node.inputs.empty() && ref.id.value % 3 == 2;
+      node.is_outside = some_outside && node.inputs.empty() && ref.id.value % 3 == 2;
       if (node.is_outside) {
         node.source = nodes_.subscription(handle, "/outside/" + node.name);
       } else if (node.inputs.empty()) {
+        nodes_.now = ref.task->offset;  // where the timer's grid begins
         node.source = nodes_.timer(handle, ref.task->period);
+        nodes_.now = 0;
       }
       node.output = nodes_.publisher(handle, "/" + node.name + "/out");
     }
@@ -600,7 +603,7 @@ class SimulatedNodes {
           nodes_.end(event.worker, node.running);
           longest[event.task.value] = std::max(longest[event.task.value], event.time - node.started);
           node.running = 0;
-          for (const std::size_t to : node.successors) deliver(event.task.value, tasks_[to]);
+          for (const std::size_t to : node.successors) deliver(event.task.value, tasks_[to], event.worker);
           break;
         case JobEventKind::Ready:
         case JobEventKind::Started:
@@ -614,7 +617,6 @@ class SimulatedNodes {
 
  private:
   static constexpr Time kEpoch = 1'700'000'000 * kSecond;  // messages have another clock than events
-  static constexpr std::uint32_t kStoring = 1000;          // thread of callbacks that store a message
 
   struct Node {
     std::string name;
@@ -630,7 +632,7 @@ class SimulatedNodes {
     bool is_outside = false;
   };
 
-  void deliver(std::size_t from, Node &to) {
+  void deliver(std::size_t from, Node &to, std::uint32_t thread) {
     if (to.running != 0) overlapped_ = true;  // would wait for the node's group
     to.fresh.insert(from);
     const auto input = std::find_if(to.inputs.begin(), to.inputs.end(), [&](const auto &i) { return i.first == from; });
@@ -638,8 +640,8 @@ class SimulatedNodes {
       to.trigger = input->second;
       to.fresh.clear();
     } else {
-      nodes_.start(kStoring, input->second);
-      nodes_.end(kStoring, input->second);
+      nodes_.start(thread, input->second);
+      nodes_.end(thread, input->second);
     }
   }
 
@@ -648,28 +650,37 @@ class SimulatedNodes {
   bool overlapped_ = false;
 };
 
-TEST(SimulatedRecording, IsImportedAsTheWorkload) {
+GenerateOptions random_robots() {
   GenerateOptions options;
   options.dags = 3;
   options.utilization = 0.7;
   options.period_min = 10 * kMillisecond;
   options.period_max = 200 * kMillisecond;
   options.bcet_min = 0.5;
+  return options;
+}
+
+trace::Trace simulated(const Workload &workload, std::uint64_t seed, Duration duration = 20 * kSecond) {
+  SessionOptions session;
+  session.duration = duration;
+  session.seed = seed;
+  Result<Session> run = run_session(workload, *parse_variant("mte"), session);
+  if (run) return std::move(run->trace);
+  ADD_FAILURE() << to_string(run.error());
+  return {};
+}
+
+TEST(SimulatedRecording, IsImportedAsTheWorkload) {
   std::size_t used = 0;
   std::size_t edges = 0;
   std::size_t found_edges = 0;
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
     SCOPED_TRACE(seed);
-    const Result<Workload> generated = generate(options, seed);
+    const Result<Workload> generated = generate(random_robots(), seed);
     ASSERT_TRUE(generated);
-    SessionOptions session;
-    session.duration = 20 * kSecond;
-    session.seed = seed;
-    const Result<Session> run = run_session(*generated, *parse_variant("mte"), session);
-    ASSERT_TRUE(run) << to_string(run.error());
     Recording recording;
     SimulatedNodes nodes(*generated, recording);
-    if (!nodes.play(run->trace.events)) continue;
+    if (!nodes.play(simulated(*generated, seed).events)) continue;
     ++used;
     const Result<ImportedWorkload> imported = import_workload(recording, 1);
     ASSERT_TRUE(imported) << to_string(imported.error());
@@ -708,12 +719,46 @@ TEST(SimulatedRecording, IsImportedAsTheWorkload) {
       found_edges += waits_for.size();
     }
     EXPECT_EQ(imported->explained, imported->executed);
+    EXPECT_LE(imported->workload.platform.workers, generated->platform.workers);
   }
   EXPECT_GE(used, 50U);
   EXPECT_GT(static_cast<double>(found_edges), 0.7 * static_cast<double>(edges));
   RecordProperty("workloads", static_cast<int>(used));
   RecordProperty("edges", static_cast<int>(edges));
   RecordProperty("found", static_cast<int>(found_edges));
+}
+
+TEST(SimulatedRecording, IsReproducedByTheModelOfItsExecutor) {
+  GenerateOptions options = random_robots();
+  options.shape = DagShape::Chain;
+  options.offsets = true;
+  std::size_t tasks = 0;
+  std::size_t reproduced = 0;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    SCOPED_TRACE(seed);
+    const Result<Workload> generated = generate(options, seed);
+    ASSERT_TRUE(generated);
+    Recording recording;
+    SimulatedNodes nodes(*generated, recording, false);
+    ASSERT_TRUE(nodes.play(simulated(*generated, seed, 100 * kSecond).events));
+    Result<ImportedWorkload> imported = import_workload(recording, 1);
+    ASSERT_TRUE(imported) << to_string(imported.error());
+    const Result<SelfCheck> check = check_against_recording(*imported);
+    ASSERT_TRUE(check) << to_string(check.error());
+    EXPECT_EQ(check->executor, "mte");
+    EXPECT_EQ(check->tasks.size(), generated->task_count());
+    for (const ReproducedTask &task : check->tasks) {
+      EXPECT_LE(task.p50_error(), 0.1) << task.name;
+      ++tasks;
+      if (task.is_reproduced()) ++reproduced;
+    }
+    // On one worker it is another robot.
+    imported->workload.platform.workers = 1;
+    const Result<SelfCheck> other = check_against_recording(*imported);
+    ASSERT_TRUE(other) << to_string(other.error());
+    EXPECT_FALSE(
+        std::all_of(other->tasks.begin(), other->tasks.end(), [](const auto &t) { return t.is_reproduced(); }));
+  }
 }
 
 }  // namespace

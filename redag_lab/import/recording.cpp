@@ -115,7 +115,16 @@ void Recording::start(const RosEvent &event) {
     note_overlaps(thread, position);
   }
   thread.taken_by = kUnknown;
-  thread.runs.push_back({event.handle, position, event.time, thread.absent, 0, {}});
+  const auto released = position == kUnknown ? std::nullopt : release_of(callbacks_[position], event.time);
+  thread.runs.push_back({event.handle, position, event.time, released, thread.absent, 0, {}});
+}
+
+std::optional<Time> Recording::release_of(const CallbackRecord &callback, Time start) const {
+  const Duration period = callback.id.period;
+  if (period > 0) return start - (start - callback.created) % period;
+  const auto sent = last_sent_.find(callback.id.name);
+  if (callback.id.kind != Callback::Kind::Subscription || sent == last_sent_.end()) return std::nullopt;
+  return sent->second;
 }
 
 void Recording::note_overlaps(const Thread &thread, std::size_t position) {
@@ -158,7 +167,9 @@ void Recording::end(const RosEvent &event) {
   }
   CallbackRecord &callback = callbacks_[run.callback];
   callback.executed += own;
-  (run.sent.empty() ? callback.quiet : callback.publishing).add(own);
+  Runs &runs = run.sent.empty() ? callback.quiet : callback.publishing;
+  runs.execution.add(own);
+  if (run.released) runs.response.add(event.time - *run.released);
   for (const Sent &sent : run.sent) {
     CallbackRecord::Output &output = callback.outputs[*sent.topic];
     ++output.runs;
@@ -169,6 +180,7 @@ void Recording::end(const RosEvent &event) {
 void Recording::publish(const RosEvent &event) {
   const auto topic = publishers_.find({event.process, event.handle});
   if (topic == publishers_.end()) return;
+  last_sent_[topic->second] = event.time;
   Thread &thread = thread_of(event);
   if (thread.runs.empty()) {
     sent_elsewhere_.insert(topic->second);

@@ -23,6 +23,12 @@ namespace redag::lab {
 /// Arrivals that are kept of each callback, for its rate.
 inline constexpr std::size_t kMostArrivals = 4096;
 
+/// Times of runs that ended.
+struct Runs {
+  metrics::DurationSketch execution{1024};
+  metrics::DurationSketch response{1024};  // since a timer expired, or a callback sent the message
+};
+
 struct CallbackRecord {
   /// What its runs sent to a topic.
   struct Output {
@@ -36,8 +42,8 @@ struct CallbackRecord {
   std::uint64_t runs = 0;  // that began
   Time first_start = 0;
   Time last_start = 0;
-  metrics::DurationSketch quiet{1024};       // execution of runs that published nothing
-  metrics::DurationSketch publishing{1024};  // and of the others
+  Runs quiet;       // that published nothing
+  Runs publishing;  // the others
   Duration executed = 0;
   std::map<std::string, Output> outputs;  // by topic
   std::vector<Time> begun;                // when the first runs began
@@ -86,6 +92,7 @@ class Recording {
     std::uint64_t handle = 0;
     std::size_t callback = kUnknown;
     Time start = 0;
+    std::optional<Time> released;
     Duration absent = 0;  // of the thread, when the run began
     Duration inner = 0;   // execution of callbacks that this run called
     std::vector<Sent> sent;
@@ -100,6 +107,7 @@ class Recording {
   };
 
   void make(const RosEvent &event, Callback::Kind kind);
+  [[nodiscard]] std::optional<Time> release_of(const CallbackRecord &callback, Time start) const;
   [[nodiscard]] std::size_t find(std::uint32_t process, std::uint64_t address) const;
   Thread &thread_of(const RosEvent &event);
   void bind_subscription(const RosEvent &event);
@@ -112,6 +120,7 @@ class Recording {
   std::vector<CallbackRecord> callbacks_;
   std::map<std::uint32_t, ProcessRecord> processes_;
   std::set<std::string> sent_elsewhere_;
+  std::map<std::string, Time> last_sent_;  // of topics
   std::uint64_t events_ = 0;
   Time first_ = 0;
   Time last_ = 0;

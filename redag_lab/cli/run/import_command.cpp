@@ -8,12 +8,14 @@
 #include "redag/base/text.hpp"
 #include "redag/base/words.hpp"
 #include "redag/loader/provenance.hpp"
+#include "redag_analysis/text/table.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/files.hpp"
 #include "redag_lab/cli/terminal/progress.hpp"
 #include "redag_lab/cli/terminal/signals.hpp"
 #include "redag_lab/import/ctf_reader.hpp"
 #include "redag_lab/import/model.hpp"
+#include "redag_lab/import/self_check.hpp"
 
 namespace redag::cli {
 namespace {
@@ -22,6 +24,7 @@ struct ImportOptions {
   std::string trace;
   std::string file;
   std::string process;
+  bool check = false;
 };
 
 // Returns the one process to import. Otherwise prints which there are.
@@ -59,6 +62,40 @@ std::vector<std::string> gaps_of(const lab::ReadTrace &read) {
   return gaps;
 }
 
+// Prints whether the simulator does what the robot did. Returns the exit status.
+int check_model(const lab::ImportedWorkload &imported, Console &console) {
+  const Result<lab::SelfCheck> check = lab::check_against_recording(imported);
+  if (!check) {
+    console.note(check.error());
+    return kExitBad;
+  }
+  Table table({{.title = "response of"},
+               {.title = "p50"},
+               {.title = "simulated"},
+               {.title = "p99"},
+               {.title = "simulated"},
+               {.title = ""}});
+  std::size_t wrong = 0;
+  for (const lab::ReproducedTask &task : check->tasks) {
+    if (!task.is_reproduced()) ++wrong;
+    table.add({{task.name},
+               {humanize_duration(task.recorded.p50)},
+               {humanize_duration(task.simulated.p50)},
+               {humanize_duration(task.recorded.p99)},
+               {humanize_duration(task.simulated.p99)},
+               {task.is_reproduced() ? "" : "differs", Tint::Bad}});
+  }
+  console.say(table.render(console.out_traits().width, console.out_traits().colour));
+  console.say(fmt::format(
+      "The model of {} reproduces {} of {} (p50 within 10 %, p99 within 25 %, or 100us). Trust no comparison of the "
+      "others.\n",
+      check->executor, check->tasks.size() - wrong, plural(check->tasks.size(), "recorded response")));
+  if (!check->unknown.empty()) {
+    console.say(fmt::format("unknown: when jobs of {} were released\n", join_first(check->unknown, 5)));
+  }
+  return wrong == 0 ? kExitOk : kExitNo;
+}
+
 int import_trace(const ImportOptions &options, Console &console) {
   if (!options.file.empty()) {
     if (const Result<void> possible = check_output(options.file); !possible) {
@@ -93,20 +130,22 @@ int import_trace(const ImportOptions &options, Console &console) {
     imported->remarks.insert(imported->remarks.begin(), gap);
   }
   const std::string text = provenance_to_comment(current_provenance()) + lab::to_yaml(*imported);
-  if (options.file.empty()) {
+  if (options.file.empty() && !options.check) {
     console.print(text);
     return kExitOk;
   }
-  if (const Result<void> written = write_text(options.file, text); !written) {
-    console.note(written.error());
-    return kExitBad;
-  }
   for (const std::string &remark : imported->remarks) console.say(remark + "\n");
-  console.say(fmt::format("wrote {}: {}, {}, {} left out; its comments say what is assumed, and what is unknown\n",
-                          options.file, plural(imported->workload.dags.size(), "DAG"),
-                          plural(imported->workload.task_count(), "task"),
-                          plural(imported->left_out.size(), "callback")));
-  return kExitOk;
+  if (!options.file.empty()) {
+    if (const Result<void> written = write_text(options.file, text); !written) {
+      console.note(written.error());
+      return kExitBad;
+    }
+    console.say(fmt::format("wrote {}: {}, {}, {} left out; its comments say what is assumed, and what is unknown\n",
+                            options.file, plural(imported->workload.dags.size(), "DAG"),
+                            plural(imported->workload.task_count(), "task"),
+                            plural(imported->left_out.size(), "callback")));
+  }
+  return options.check ? check_model(*imported, console) : kExitOk;
 }
 
 }  // namespace
@@ -119,6 +158,8 @@ Action add_import(CLI::App &app) {
   app.add_option("--process", options->process,
                  "Process to import, if several ran callbacks: its number or its program")
       ->type_name("PROCESS");
+  app.add_flag("--check", options->check,
+               "Simulate the executor that was recorded, and exit with status 1 unless its responses are as recorded");
   return [options](Console &console) { return import_trace(*options, console); };
 }
 
