@@ -94,27 +94,29 @@ std::string content_of(const fs::path &path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
+template <class Integer>
+Integer integer_at(const std::string &bytes, std::size_t at) {
+  Integer value = 0;
+  std::memcpy(&value, bytes.data() + at, sizeof(value));
+  return value;
+}
+
 /// True if every packet of a metadata file lies in it whole, or if it is plain text. libbabeltrace2 2.0 never returns
 /// from a packet that is cut off.
-bool is_whole_metadata(const std::string &trace) {
+bool is_whole_metadata(const std::string &bytes) {
   constexpr std::size_t kHeader = 37;
   constexpr std::uint32_t kMagic = 0x75d11d57;
-  const std::string bytes = content_of(fs::path(trace) / "metadata");
-  const auto word = [&](std::size_t at) {
-    std::uint32_t value = 0;
-    std::memcpy(&value, bytes.data() + at, sizeof(value));
-    return value;
-  };
   if (bytes.size() < sizeof(kMagic)) return false;
-  const bool swapped = word(0) == __builtin_bswap32(kMagic);
-  if (word(0) != kMagic && !swapped) return true;
+  const auto first = integer_at<std::uint32_t>(bytes, 0);
+  if (first != kMagic && first != __builtin_bswap32(kMagic)) return true;
+  const auto size_at = [&](std::size_t at) {
+    const auto bits = integer_at<std::uint32_t>(bytes, at);
+    return (first == kMagic ? bits : __builtin_bswap32(bits)) / 8;
+  };
   for (std::size_t at = 0; at < bytes.size();) {
     if (bytes.size() - at < kHeader) return false;
-    const auto in_bytes = [&](std::size_t offset) {
-      return (swapped ? __builtin_bswap32(word(at + offset)) : word(at + offset)) / 8;
-    };
-    const std::size_t content = in_bytes(24);
-    const std::size_t packet = in_bytes(28);
+    const std::size_t content = size_at(at + 24);
+    const std::size_t packet = size_at(at + 28);
     if (content < kHeader || packet < content || packet > bytes.size() - at) return false;
     at += packet;
   }
@@ -131,19 +133,10 @@ Value inputs_of(const std::string &trace) {
   return params;
 }
 
-/// The unsigned integer at a place, in the byte order of a network.
-template <class Integer>
-Integer big_endian(const std::string &bytes, std::size_t at) {
-  Integer value = 0;
-  for (std::size_t i = 0; i < sizeof(Integer); ++i) {
-    value = static_cast<Integer>((value << 8U) | static_cast<unsigned char>(bytes[at + i]));
-  }
-  return value;
-}
-
-/// Returns how many nanoseconds a recording lasts, by the index that LTTng writes beside it; 0: there is none. For the
-/// progress alone. (The library's own query ends the process if a recording is damaged.)
-std::uint64_t length_of(const std::vector<std::string> &traces) {
+/// Returns how many nanoseconds a recording lasts, for the progress, by the index that LTTng writes beside it; 0: there
+/// is none; nothing: the index is not that of these files, which would end the process in the library. (So does, for
+/// damaged recordings, the library's own query for the length.)
+std::optional<std::uint64_t> length_of(const std::vector<std::string> &traces) {
   constexpr std::size_t kHeader = 16;
   constexpr std::size_t kEntry = 40;  // to the end of the times of its packet
   std::uint64_t begin = UINT64_MAX;
@@ -152,11 +145,15 @@ std::uint64_t length_of(const std::vector<std::string> &traces) {
     std::error_code error;
     for (fs::directory_iterator at(fs::path(trace) / "index", error), last; !error && at != last; at.increment(error)) {
       const std::string bytes = content_of(at->path());
-      if (bytes.size() < kHeader || big_endian<std::uint32_t>(bytes, 0) != 0xc1f1dcc1) continue;
-      const std::size_t entry = big_endian<std::uint32_t>(bytes, 12);
-      for (std::size_t i = kHeader; entry >= kEntry && i + entry <= bytes.size(); i += entry) {
-        begin = std::min(begin, big_endian<std::uint64_t>(bytes, i + 24));
-        end = std::max(end, big_endian<std::uint64_t>(bytes, i + 32));
+      const auto number = [&](std::size_t place) { return __builtin_bswap64(integer_at<std::uint64_t>(bytes, place)); };
+      if (bytes.size() < kHeader || integer_at<std::uint32_t>(bytes, 0) != __builtin_bswap32(0xc1f1dcc1)) return {};
+      const std::size_t entry = __builtin_bswap32(integer_at<std::uint32_t>(bytes, 12));
+      const std::uint64_t size = fs::file_size(fs::path(trace) / at->path().stem(), error);
+      if (entry < kEntry || error) return {};
+      for (std::size_t i = kHeader; i + entry <= bytes.size(); i += entry) {
+        if (number(i) > size || number(i + 8) / 8 > size - number(i)) return {};
+        begin = std::min(begin, number(i + 24));
+        end = std::max(end, number(i + 32));
       }
     }
   }
@@ -294,20 +291,9 @@ class Sink {
   std::int64_t now_ = 0;
 };
 
-bt_graph_simple_sink_component_initialize_func_status initialize(bt_message_iterator *messages, void *sink) {
-  static_cast<Sink *>(sink)->messages = messages;
-  return BT_GRAPH_SIMPLE_SINK_COMPONENT_INITIALIZE_FUNC_STATUS_OK;
-}
-
-bt_graph_simple_sink_component_consume_func_status consume(bt_message_iterator *, void *sink) {
-  return static_cast<Sink *>(sink)->consume();
-}
-
 Plugin find_plugin(const char *name) {
   const bt_plugin *plugin = nullptr;
-  if (bt_plugin_find(name, BT_TRUE, BT_FALSE, BT_TRUE, BT_TRUE, BT_FALSE, &plugin) != BT_PLUGIN_FIND_STATUS_OK) {
-    (void)library_error();
-  }
+  if (bt_plugin_find(name, BT_TRUE, BT_FALSE, BT_TRUE, BT_TRUE, BT_FALSE, &plugin) != 0) (void)library_error();
   return Plugin(plugin);
 }
 
@@ -328,19 +314,26 @@ Result<ReadTrace> read_ros_trace(const std::string &folder, const std::function<
                       "install them (Debian, Ubuntu: libbabeltrace2-0)");
   }
 
-  Sink taker(sink, progress, length_of(*traces));
+  const std::optional<std::uint64_t> length = length_of(*traces);
+  if (!length) return damaged(folder, "its index is that of other files");
+  Sink taker(sink, progress, *length);
+  const auto begin = [](bt_message_iterator *messages, void *data) {
+    static_cast<Sink *>(data)->messages = messages;
+    return BT_GRAPH_SIMPLE_SINK_COMPONENT_INITIALIZE_FUNC_STATUS_OK;
+  };
+  const auto consume = [](bt_message_iterator *, void *data) { return static_cast<Sink *>(data)->consume(); };
   const Graph graph(bt_graph_create(0));
   const bt_component_filter *merged = nullptr;
   const bt_component_sink *last = nullptr;
   if (!graph ||
       bt_graph_add_filter_component(graph.get(), muxer, "merge", nullptr, BT_LOGGING_LEVEL_NONE, &merged) != 0 ||
-      bt_graph_add_simple_sink_component(graph.get(), "redag", initialize, consume, nullptr, &taker, &last) != 0) {
+      bt_graph_add_simple_sink_component(graph.get(), "redag", begin, consume, nullptr, &taker, &last) != 0) {
     return damaged(folder);
   }
   std::size_t position = 0;
   for (const std::string &trace : *traces) {
     const bt_component_source *source = nullptr;
-    if (!is_whole_metadata(trace)) return damaged(trace, "its metadata are cut off");
+    if (!is_whole_metadata(content_of(fs::path(trace) / "metadata"))) return damaged(trace, "its metadata are cut off");
     const Value params = inputs_of(trace);
     if (!params || bt_graph_add_source_component(graph.get(), reader, fmt::format("trace {}", position++).c_str(),
                                                  params.get(), BT_LOGGING_LEVEL_NONE, &source) != 0) {

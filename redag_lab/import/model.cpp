@@ -89,9 +89,14 @@ class Importing {
   Positions usable_callbacks() {
     Positions usable;
     std::size_t never = 0;
+    std::uint64_t of_ros = 0;
     for (std::size_t i = 0; i < callbacks_.size(); ++i) {
       const CallbackRecord &callback = callbacks_[i];
       if (callback.process != pid_) continue;
+      if (is_ros_internal(callback.id)) {
+        of_ros += callback.runs;
+        continue;
+      }
       if (callback.id.kind == CallbackKind::Subscription) result_.messages += callback.runs;
       const bool is_slow = is_timer(i) && callback.id.period > (recording_.last() - callback.created) / 10;
       std::string why;
@@ -103,13 +108,15 @@ class Importing {
         why = fmt::format("ran {}: its rate is unknown", plural(callback.runs, "time"));
       }
       if (callback.runs == 0) {
-        if (!is_ros_internal(callback.id)) ++never;
+        ++never;
       } else if (why.empty()) {
         usable.push_back(i);
       } else {
         result_.left_out.push_back(fmt::format("{}: {}", to_string(callback.id), why));
       }
     }
+    if (of_ros > 0)
+      result_.left_out.push_back(fmt::format("{} of ROS itself, such as parameters", plural(of_ros, "run")));
     if (never > 0) result_.left_out.push_back(fmt::format("{} that never ran", plural(never, "callback")));
     return usable;
   }
@@ -466,6 +473,12 @@ class Importing {
     }
     result_.executed = process_.executed;
     result_.length = recording_.last() - recording_.first();
+    std::uint64_t seen = 0;
+    for (const metrics::CountedDurations &range : process_.delays.counted()) {
+      seen += range.count;
+      result_.overhead = range.low;
+      if (seen * 10 >= process_.delays.size()) break;  // a tenth of the runs found an idle thread
+    }
     const auto remark = [&](std::string text) { result_.remarks.push_back(std::move(text)); };
     remark(fmt::format("{} in {}, on {} of {}, which 'workers' counts.", plural(process_.runs, "run"),
                        humanize_duration(recording_.last() - recording_.first()), process_.threads.size(),
@@ -479,6 +492,12 @@ class Importing {
         share_of(static_cast<std::uint64_t>(result_.explained), static_cast<std::uint64_t>(result_.executed)),
         plural(result_.messages, "message"), share_of(result_.over_edges, result_.messages),
         share_of(result_.as_sources, result_.messages)));
+    if (result_.overhead > 0) {
+      remark(
+          fmt::format("A tenth of the runs began within {} of their release: what the executor takes "
+                      "(--overhead-dispatch).",
+                      humanize_duration(result_.overhead)));
+    }
     if (process_.unknown_runs > 0) {
       remark(fmt::format("unknown: {} of callbacks whose creation was not recorded.",
                          plural(process_.unknown_runs, "run")));

@@ -30,6 +30,7 @@ struct ImportedWorkload {
   std::vector<Duration> phases;
   std::vector<metrics::Distribution> responses;  // without values where no event says when a job was released
   Duration length = 0;                           // of the recording
+  Duration overhead = 0;                         // from release to begin where nothing is in the way
 };
 
 /// How the messages or requests of a source come.

@@ -748,7 +748,7 @@ TEST(SimulatedRecording, IsReproducedByTheModelOfItsExecutor) {
     EXPECT_EQ(check->executor, "mte");
     EXPECT_EQ(check->tasks.size(), generated->task_count());
     for (const ReproducedTask &task : check->tasks) {
-      EXPECT_LE(task.p50_error(), 0.1) << task.name;
+      EXPECT_LE(task.p50_error, 0.1) << task.name;
       ++tasks;
       if (task.is_reproduced()) ++reproduced;
     }

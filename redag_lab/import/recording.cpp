@@ -116,6 +116,7 @@ void Recording::start(const RosEvent &event) {
   }
   thread.taken_by = kUnknown;
   const auto released = position == kUnknown ? std::nullopt : release_of(callbacks_[position], event.time);
+  if (released) thread.process->delays.add(event.time - *released);
   thread.runs.push_back({event.handle, position, event.time, released, thread.absent, 0, {}});
 }
 

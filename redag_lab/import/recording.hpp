@@ -60,8 +60,9 @@ struct ProcessRecord {
   bool has_switches = false;                 // the kernel recorded some of these threads
   std::uint64_t runs = 0;
   Duration executed = 0;
-  std::uint64_t unknown_runs = 0;  // of callbacks whose creation was not recorded
-  std::uint64_t torn_runs = 0;     // begin or end is missing
+  std::uint64_t unknown_runs = 0;        // of callbacks whose creation was not recorded
+  std::uint64_t torn_runs = 0;           // begin or end is missing
+  metrics::DurationSketch delays{1024};  // from release to begin, where the former is known
 };
 
 class Recording {

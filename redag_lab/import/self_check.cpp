@@ -11,8 +11,6 @@
 namespace redag::lab {
 namespace {
 
-constexpr double kMostP50 = 0.1;
-constexpr double kMostP99 = 0.25;
 constexpr Duration kWakeUp = 100 * kMicrosecond;  // of a thread, which the model does not have
 constexpr Duration kLongest = 600 * kSecond;
 
@@ -23,10 +21,6 @@ double error(Duration recorded, Duration simulated) {
 }
 
 }  // namespace
-
-double ReproducedTask::p50_error() const { return error(recorded.p50, simulated.p50); }
-double ReproducedTask::p99_error() const { return error(recorded.p99, simulated.p99); }
-bool ReproducedTask::is_reproduced() const { return p50_error() <= kMostP50 && p99_error() <= kMostP99; }
 
 Result<SelfCheck> check_against_recording(const ImportedWorkload &imported) {
   Workload workload = imported.workload;
@@ -45,14 +39,17 @@ Result<SelfCheck> check_against_recording(const ImportedWorkload &imported) {
   SessionOptions options;
   options.duration = std::clamp<Duration>(imported.length, kSecond, kLongest);
   options.keep_trace = false;
+  options.overheads.dispatch = imported.overhead;
   const Result<Session> session = run_session(workload, Variant{check.executor, check.executor, {}, false}, options);
   if (!session) return tl::unexpected(session.error());
   for (const metrics::TaskSummary &task : session->summary.tasks) {
     const metrics::Distribution &recorded = imported.responses[task.task.value];
-    if (recorded.count == 0 || task.jobs.response.count == 0) {
+    const metrics::Distribution &simulated = task.jobs.response;
+    if (recorded.count == 0 || simulated.count == 0) {
       check.unknown.push_back(task.name);
     } else {
-      check.tasks.push_back({task.name, recorded, task.jobs.response});
+      check.tasks.push_back(
+          {task.name, recorded, simulated, error(recorded.p50, simulated.p50), error(recorded.p99, simulated.p99)});
     }
   }
   return check;
