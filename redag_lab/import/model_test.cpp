@@ -205,8 +205,19 @@ TEST_F(Import, FindsTimersAndWhatFollowsThem) {
   EXPECT_EQ(dag.tasks[1].wcet, 5 * ms);
   EXPECT_EQ(imported.executed, imported.explained);
   EXPECT_EQ(imported.over_edges, 20U);
+  EXPECT_EQ(imported.responses[0].max, 2 * ms + 20);
+  EXPECT_EQ(imported.responses[1].max, 6 * ms - 1);  // from the message, at the end of the scan
+  EXPECT_EQ(imported.overhead, 0);
   EXPECT_THAT(all_remarks(imported), HasSubstr("wall time"));
   EXPECT_THAT(notes_of(imported, "/lidar"), HasSubstr("longest of 20 runs"));
+}
+
+TEST_F(Import, KnowsWhenTimersExpired) {
+  const auto timer = nodes.timer(nodes.node("early"), 10 * ms);
+  for (Time k = 1; k <= 100; ++k) nodes.run(1, timer, k * 10 * ms + (k % 2 == 0 ? -2000 : 60'000), ms);
+  const ImportedWorkload imported = import(recording);
+  EXPECT_EQ(imported.responses[0].min, ms);
+  EXPECT_EQ(imported.responses[0].max, ms + 60'000);
 }
 
 TEST_F(Import, SplitsWhereRatesDiffer) {

@@ -122,7 +122,11 @@ void Recording::start(const RosEvent &event) {
 
 std::optional<Time> Recording::release_of(const CallbackRecord &callback, Time start) const {
   const Duration period = callback.id.period;
-  if (period > 0) return start - (start - callback.created) % period;
+  if (period > 0) {
+    // The timer's grid begins a little before its creation is recorded.
+    const Duration early = std::min(period / 10, kMillisecond);
+    return std::min(start, start + early - (start + early - callback.created) % period);
+  }
   const auto sent = last_sent_.find(callback.id.name);
   if (callback.id.kind != Callback::Kind::Subscription || sent == last_sent_.end()) return std::nullopt;
   return sent->second;

@@ -39,8 +39,8 @@ class Import(Case):
         self.assertRegex(result.stdout, r"The model of mte reproduces \d+ of \d+ recorded responses")
 
     def test_other_processes(self):
-        self.expect(redag("import", RECORDING, "--process", "nobody"), 2, "--process: 'nobody' ran no callback")
-        self.expect(redag("import", RECORDING, "--process", "robot"), 0)
+        self.expect(redag("import", RECORDING, "nobody"), 2, "'nobody' ran no callback", "(robot, ")
+        self.expect(redag("import", RECORDING, "robot"), 0)
 
     def test_what_is_no_recording(self):
         self.expect(redag("import", "/no/such/folder"), 2, "is no folder")

@@ -43,9 +43,9 @@ std::optional<std::uint32_t> choose_process(const lab::Recording &recording, con
                                                                 ? "record the events 'ros2:*', as `ros2 trace` does"
                                                                 : "let the nodes run while it records");
   } else if (chosen.empty()) {
-    console.error(fmt::format("--process: {} ran no callback; these did: {}", in_quotes(wanted), join(names)));
+    console.error(fmt::format("{} ran no callback; these processes did: {}", in_quotes(wanted), join(names)));
   } else {
-    console.error("several processes ran callbacks: " + join(names), "choose one with --process");
+    console.error("several processes ran callbacks: " + join(names), "name one of them behind the recording");
   }
   return std::nullopt;
 }
@@ -154,10 +154,8 @@ Action add_import(CLI::App &app) {
   auto options = std::make_shared<ImportOptions>();
   app.add_option("TRACE", options->trace, "Folder that `ros2 trace` or LTTng recorded to: the Common Trace Format")
       ->required();
+  app.add_option("PROCESS", options->process, "Its number or program, if several processes ran callbacks");
   app.add_option("-o,--output", options->file, "File to write (default: standard output)")->type_name("FILE");
-  app.add_option("--process", options->process,
-                 "Process to import, if several ran callbacks: its number or its program")
-      ->type_name("PROCESS");
   app.add_flag("--check", options->check,
                "Simulate the executor that was recorded, and exit with status 1 unless its responses are as recorded");
   return [options](Console &console) { return import_trace(*options, console); };
