@@ -37,8 +37,8 @@ constexpr std::array kCommands = {
           "  redag generate --dags 4 --utilization 1.6 --seed 7 -o random.yaml\n"
           "  redag generate --periods robot --shape chain | redag validate -\n"},
     Entry{"import", "Make a workload of a recording of a ROS 2 robot by ros2_tracing", add_import,
-          "  redag import ~/.ros/tracing/session -o robot.yaml\n"
-          "  redag import session planner -o planner.yaml\n"},
+          "  redag import workloads/traces/jazzy_mte -o robot.yaml\n"
+          "  redag import workloads/traces/jazzy_mte robot --check || echo 'differs'\n"},
     Entry{"simulate", "Simulate a workload in virtual time; results depend on the seed alone", add_simulate,
           "  redag simulate workloads/robot.yaml\n"
           "  redag simulate workloads/robot.yaml --executor mte --duration 60s --json\n"
