@@ -34,7 +34,7 @@ std::optional<std::uint32_t> choose_process(const lab::Recording &recording, con
   std::vector<std::string> names;
   for (const auto &[process, record] : recording.processes()) {
     if (record.runs == 0) continue;
-    names.push_back(fmt::format("{} ({}, {})", process, record.program, plural(record.runs, "run")));
+    names.push_back(fmt::format("{} ({}, {})", process, printable(record.program), plural(record.runs, "run")));
     if (wanted.empty() || wanted == std::to_string(process) || wanted == record.program) chosen.push_back(process);
   }
   if (chosen.size() == 1) return chosen.front();
