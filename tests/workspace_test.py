@@ -56,7 +56,8 @@ OPTIONAL = {"redag_rclcpp": {"cm_executors"},
                                  "controller_interface", "controller_manager", "controller_manager_msgs",
                                  "hardware_interface", "pluginlib", "sensor_msgs",
                                  "geometry_msgs", "nav2_controller", "nav2_msgs", "nav_msgs",
-                                 "rclcpp_action", "rosbag2_cpp", "rosbag2_storage", "rosbag2_transport", "tf2_ros"}}
+                                 "message_filters", "rclcpp_action", "rosbag2_cpp", "rosbag2_storage", "rosbag2_transport",
+                                 "tf2_ros"}}
 # Folders of the repository that a package uses where they are there, and does without elsewhere.
 BESIDE = ("../../evaluation/benchmarks/counted", "../../tests/testing")
 ROS_PACKAGES = ("redag_rclcpp", "redag_rclcpp_lab")
