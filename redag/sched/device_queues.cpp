@@ -16,7 +16,6 @@ void DeviceQueues::rebuild() {
 }
 
 void DeviceQueues::serve() {
-  has_news_ = false;
   for (State &state : devices_) {
     for (std::uint32_t slot = state.top(); slot != kNil && state.used < state.device.slots; slot = state.top()) {
       remove(state, slot);
@@ -26,17 +25,13 @@ void DeviceQueues::serve() {
   }
 }
 
-void DeviceQueues::join(std::uint32_t slot) {
-  add(of(slot), slot);
-  has_news_ = true;
-}
+void DeviceQueues::join(std::uint32_t slot) { add(of(slot), slot); }
 
 void DeviceQueues::leave(std::uint32_t slot) {
   const Job &job = table_.jobs[slot];
   if (job.parked_at == kNil) return;  // it waits without a device
   if (job.state == JobState::Queued) return remove(of(slot), slot);
   --of(slot).used;
-  has_news_ = true;
 }
 
 void DeviceQueues::begin_rekey(std::uint32_t slot) {

@@ -21,8 +21,6 @@ class DeviceQueues {
   /// Takes the devices of the table, and gives the jobs that are Queued their places by their present keys.
   void rebuild();
 
-  /// Returns true if a job may have to be served.
-  [[nodiscard]] bool has_news() const { return has_news_; }
   /// Lets each device that has a free slot serve the first job of its queue.
   void serve();
 
@@ -53,7 +51,6 @@ class DeviceQueues {
 
   JobTable &table_;
   std::vector<State> devices_;
-  bool has_news_ = false;
 };
 
 }  // namespace redag::sched

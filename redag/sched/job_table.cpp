@@ -21,8 +21,9 @@ DagId JobTable::append_dag(const Dag &dag) {
   for (std::size_t i = 0; i < dag.tasks.size(); ++i) add_state(id, topological[i], dag.tasks[i]);
   const std::vector<TaskId> &ids = dags[id.value].tasks;
   for (std::size_t i = 0; i < ids.size(); ++i) {
-    for (const std::uint32_t p : dag.tasks[i].predecessors)
-      tasks[ids[i].value].joined = tasks[ids[p].value].joined = true;
+    TaskState &task = tasks[ids[i].value];
+    task.is_special = task.is_special || (task.timer && !dag.tasks[i].predecessors.empty());
+    for (const std::uint32_t p : dag.tasks[i].predecessors) task.joined = tasks[ids[p].value].joined = true;
   }
   precedence.add_dag(dag, ids);
   reserve_step();
@@ -38,7 +39,7 @@ TaskId JobTable::append_task(DagId dag, std::uint32_t rank, const Task &task) {
 }
 
 TaskId JobTable::add_state(DagId dag, std::uint32_t rank, const Task &task) {
-  static_assert(offsetof(TaskState, released_earlier) == 64, "what every job needs of its task is in one cache line");
+  static_assert(offsetof(TaskState, skipped) == 64, "what every job needs of its task is in one cache line");
   REDAG_CHECK(task.period > 0 && task.deadline > 0, "a task needs a period and a deadline (inherit_periods)");
   REDAG_CHECK(task.concurrency > 0, "a task that may have no job in progress never runs");
   TaskId id(tasks.size());
@@ -61,6 +62,7 @@ TaskId JobTable::add_state(DagId dag, std::uint32_t rank, const Task &task) {
   state.timer = task.activation == Activation::Timer;
   if (state.timer && keeps_timer_releases) state.queue_depth = kUnboundedQueue;
   state.on_budget = task.on_budget;
+  state.is_special = dags[dag.value].max_pending > 0;
   state.degraded = high_mode && dags[dag.value].degrades();
   // One slot for each job that can be started, each that can be ready, and one that waits for predecessors.
   const std::uint32_t queued = state.queue_depth == kUnboundedQueue ? 1 : std::max(1U, state.queue_depth);

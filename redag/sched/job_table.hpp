@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <limits>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -30,25 +31,25 @@ inline constexpr std::uint32_t kUnboundedQueue = std::numeric_limits<std::uint32
 // The first 64 bytes hold everything that a job needs from its release to its end.
 struct alignas(64) TaskState {
   Duration deadline = 0;
-  std::int64_t key = 0;  // static policies: the key of its jobs that have inherited nothing
+  std::int64_t key = 0;        // static policies: the key of its jobs that have inherited nothing
+  std::uint64_t released = 0;  // the number of the next job, whose lower half jobs have
   std::uint64_t finished = 0;
   std::uint32_t rank = 0;  // its place in the order of tasks; not valid for a task that is gone
   DagId dag;
-  std::uint32_t queue_depth = 0;      // 0: overrun by skipping; kUnboundedQueue: no limit
   std::uint32_t free_slot = kNil;     // head of the list of free job slots, linked by Job::next
   std::uint32_t waiting = kNil;       // the job whose predecessors are incomplete
   std::uint32_t latest_ready = kNil;  // the job that became ready last; it has not started if ready_count > 0
   std::uint32_t ready_count = 0;      // ready and not started
-  std::uint32_t next_number = 0;      // number of the next job, modulo 2^32
   bool timer = true;
   bool joined = false;  // has predecessors or successors
+  // More rules hold for its releases than for most: it is a timer with predecessors, or its DAG has a max_pending.
+  bool is_special = false;
+  bool degraded = false;  // HI mode, and its DAG is of lower criticality: its jobs are demoted from the start
   TaskLife life = TaskLife::Live;
   OnBudget on_budget = OnBudget::Abort;
   bool skips_next = false;  // a job used its budget: the next release is skipped
-  bool degraded = false;    // HI mode, and its DAG is of lower criticality: its jobs are demoted from the start
   bool on_grid = true;      // its releases are points of a grid, or it has no releases of its own
 
-  std::uint64_t released_earlier = 0;  // releases before next_number last wrapped around to 0
   std::uint64_t skipped = 0;
   std::uint64_t aborted = 0;
   std::uint64_t no_data = 0;  // of the aborted ones
@@ -58,7 +59,8 @@ struct alignas(64) TaskState {
   Time let_through = kNoRelease;  // while degraded: its newest release that was let through
   std::uint32_t tier = 0;         // shared by the tasks that take turns
   std::uint32_t level = 0;
-  std::uint32_t group = kNil;  // position among the groups
+  std::uint32_t group = kNil;     // position among the groups
+  std::uint32_t queue_depth = 0;  // 0: overrun by skipping; kUnboundedQueue: no limit
   std::uint32_t concurrency = 1;
   std::uint32_t topological_rank = 0;
   int fixed_priority = 0;
@@ -67,7 +69,7 @@ struct alignas(64) TaskState {
 struct DagState {
   std::uint32_t max_active = 0;
   std::uint32_t max_pending = 0;
-  std::uint32_t pending = 0;  // released, not started
+  std::uint32_t pending = 0;  // with max_pending: jobs released and not started
   Criticality criticality = Criticality::Normal;
   bool removed = false;
   bool free = false;          // its id can be used again
@@ -100,7 +102,6 @@ class JobTable {
     task.free_slot = jobs[slot].next;
     return slot;
   }
-  void free_slot(std::uint32_t slot) { free_slot(slot, task_of(jobs[slot])); }
   void free_slot(std::uint32_t slot, TaskState &task) {
     jobs[slot].state = JobState::Free;
     jobs[slot].next = task.free_slot;
@@ -110,7 +111,13 @@ class JobTable {
   // ---- counts of jobs that have not started ----
 
   /// A job of the task is released.
-  void count_pending(const TaskState &task) { ++dags[task.dag.value].pending; }
+  void count_pending(const TaskState &task) {
+    if (task.is_special) ++dags[task.dag.value].pending;
+  }
+  /// It starts, or is skipped.
+  void count_no_longer_pending(const TaskState &task) {
+    if (task.is_special) --dags[task.dag.value].pending;
+  }
   /// The pending job becomes ready.
   void count_ready(TaskState &task, std::uint32_t slot) {
     ++task.ready_count;
@@ -122,7 +129,7 @@ class JobTable {
   [[gnu::always_inline]] void start(std::uint32_t slot, WorkerId worker, std::uint32_t over, std::uint32_t level) {
     TaskState &task = task_of(jobs[slot]);
     --task.ready_count;
-    --dags[task.dag.value].pending;
+    count_no_longer_pending(task);
     start_uncounted(slot, worker, over, level);
   }
   /// As start(), for a job that was counted neither as pending nor as ready.
@@ -193,6 +200,9 @@ class JobTable {
 
   [[nodiscard]] TaskState &task_of(const Job &job) { return tasks[job.task.value]; }
   [[nodiscard]] const TaskState &task_of(const Job &job) const { return tasks[job.task.value]; }
+  // Compared by address, which spares a division by the size of an entry.
+  [[nodiscard]] bool has(TaskId task) const { return tasks.data() + task.value < std::to_address(tasks.end()); }
+  [[nodiscard]] bool has(JobSlot job) const { return jobs.data() + job.value < std::to_address(jobs.end()); }
   [[nodiscard]] std::size_t group_slots() const { return groups_.size(); }
 
   const Config config;

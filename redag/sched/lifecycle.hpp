@@ -94,7 +94,7 @@ class Lifecycle final : public Scheduler {
   [[nodiscard]] std::size_t dag_slots() const override { return table_.dags.size(); }
   [[nodiscard]] Accounting accounting(TaskId task) const override {
     const TaskState &state = table_.tasks[task.value];
-    return Accounting{.released = state.released_earlier + state.next_number,
+    return Accounting{.released = state.released,
                       .finished = state.finished,
                       .skipped = state.skipped,
                       .aborted = state.aborted,
@@ -121,18 +121,19 @@ class Lifecycle final : public Scheduler {
 
   // From release to readiness.
   [[gnu::always_inline]] inline void admit(TaskId id, Time nominal, Time origin);
-  void admit_or_refuse(TaskId id, Time nominal, Time origin);
+  void admit_by_rules(TaskId id, Time nominal, Time origin);
   void refuse(TaskId id, Time nominal, Reason reason);
   inline void use_data(TaskId id);
-  static std::uint32_t count_release(TaskState &task);
   [[nodiscard]] Time turn_of(const TaskState &task, Time origin) const;
   inline void make_ready(std::uint32_t slot, Time origin);
-  [[nodiscard, gnu::always_inline]] inline std::uint32_t add_job(TaskId id, TaskState &task, std::uint32_t number,
-                                                                 Time nominal, Time turn);
-  [[gnu::always_inline]] inline void prepare(Job &job, const TaskState &task, Time origin);
+  [[nodiscard, gnu::always_inline]] inline std::uint32_t add_ready_job(TaskId id, TaskState &task, Time nominal,
+                                                                       Time origin, Time turn);
+  [[nodiscard, gnu::always_inline]] inline std::int64_t key_of_next(const TaskState &task, Time deadline) const;
   [[gnu::always_inline]] inline bool hand_over(std::uint32_t slot, Time now, std::uint32_t most);
   void tell_hand_over(const Job &ended, const Job &next, Time now);
   void skip(std::uint32_t slot, Reason reason);
+  [[gnu::always_inline]] inline void end(std::uint32_t slot, Time now, Outcome outcome);
+  [[gnu::always_inline]] inline Step take_step(std::uint32_t most);
   template <class Predicate>
   void skip_all(Reason reason, Predicate which);
   [[nodiscard]] bool takes_releases(const TaskState &task) const { return task.life == TaskLife::Live && !closed_; }

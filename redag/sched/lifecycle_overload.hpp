@@ -22,8 +22,7 @@ namespace redag::sched {
 template <Dispatcher D>
 void Lifecycle<D>::exceed(JobSlot job_slot, Limit limit, Time now) {
   if (!D::kEnforcesLimits) return;
-  REDAG_CHECK(job_slot.value < table_.jobs.size() && table_.jobs[job_slot.value].started(),
-              "a job that does not run uses nothing");
+  REDAG_CHECK(table_.has(job_slot) && table_.jobs[job_slot.value].started(), "a job that does not run uses nothing");
   table_.step.begin(now);
   const Job &job = table_.jobs[job_slot.value];
   if (limit == Limit::WcetLow) return enter_high_mode(job);

@@ -14,16 +14,15 @@ namespace redag::sched {
 
 template <Dispatcher D>
 void Lifecycle<D>::release(TaskId task, Time nominal, Time now, Time origin) {
-  REDAG_CHECK(task.value < table_.tasks.size(), "release of a task that does not exist");
+  REDAG_CHECK(table_.has(task), "release of a task that does not exist");
   REDAG_CHECK(table_.tasks[task.value].timer, "data tasks are released by their predecessors");
   table_.step.begin(now);
-  if (table_.tasks[task.value].life != TaskLife::Live) return;
-  restricted_ ? admit_or_refuse(task, nominal, origin) : admit(task, nominal, origin);
+  if (table_.tasks[task.value].life == TaskLife::Live) admit(task, nominal, origin);
 }
 
 template <Dispatcher D>
 void Lifecycle<D>::receive(TaskId task, TaskId sender, Time at, Time now, Time origin) {
-  REDAG_CHECK(task.value < table_.tasks.size(), "a message for a task that does not exist");
+  REDAG_CHECK(table_.has(task), "a message for a task that does not exist");
   REDAG_CHECK(!table_.tasks[task.value].timer && !table_.tasks[task.value].on_grid,
               "only data tasks that were added alone have messages");
   table_.step.begin(now);
@@ -32,15 +31,8 @@ void Lifecycle<D>::receive(TaskId task, TaskId sender, Time at, Time now, Time o
 }
 
 template <Dispatcher D>
-void Lifecycle<D>::admit_or_refuse(TaskId id, Time nominal, Time origin) {
-  if (closed_) return;
-  const Reason reason = refusal(table_.tasks[id.value], nominal);
-  reason == Reason::None ? admit(id, nominal, origin) : refuse(id, nominal, reason);
-}
-
-template <Dispatcher D>
 void Lifecycle<D>::miss(TaskId id, Time nominal, Time now, Reason reason) {
-  REDAG_CHECK(id.value < table_.tasks.size(), "release of a task that does not exist");
+  REDAG_CHECK(table_.has(id), "release of a task that does not exist");
   TaskState &task = table_.tasks[id.value];
   REDAG_CHECK(task.timer, "data tasks are released by their predecessors");
   table_.step.begin(now);
@@ -49,34 +41,26 @@ void Lifecycle<D>::miss(TaskId id, Time nominal, Time now, Reason reason) {
   refuse(id, nominal, refused == Reason::None ? reason : refused);
 }
 
-// Counts a release and returns the number of its job.
-template <Dispatcher D>
-std::uint32_t Lifecycle<D>::count_release(TaskState &task) {
-  const std::uint32_t number = task.next_number++;
-  if (task.next_number == 0) task.released_earlier += std::uint64_t{1} << 32U;
-  return number;
-}
-
 template <Dispatcher D>
 void Lifecycle<D>::refuse(TaskId id, Time nominal, Reason reason) {
   TaskState &task = table_.tasks[id.value];
-  const std::uint32_t number = count_release(task);
+  const auto number = static_cast<std::uint32_t>(task.released++);
   table_.step.emit(id, number, WorkerId(), JobEventKind::Released, nominal);
   ++task.skipped;
   table_.step.emit(id, number, WorkerId(), JobEventKind::Skipped, 0, reason);
 }
 
 template <Dispatcher D>
-void Lifecycle<D>::complete(JobSlot job_slot, Time now, Outcome outcome) {
-  REDAG_CHECK(job_slot.value < table_.jobs.size() && table_.jobs[job_slot.value].started(),
-              "completion of a job that does not run");
+void Lifecycle<D>::complete(JobSlot job, Time now, Outcome outcome) {
+  REDAG_CHECK(table_.has(job) && table_.jobs[job.value].started(), "completion of a job that does not run");
   table_.step.begin(now);
-  const std::uint32_t slot = job_slot.value;
+  end(job.value, now, outcome);
+}
+
+template <Dispatcher D>
+void Lifecycle<D>::end(std::uint32_t slot, Time now, Outcome outcome) {
   const Job &job = table_.jobs[slot];
-  const TaskId id = job.task;
-  const Time release = job.release;
-  const Time origin = job.origin;
-  TaskState &task = table_.tasks[id.value];
+  TaskState &task = table_.task_of(job);
   if (outcome == Outcome::Finished) {
     ++task.finished;
     table_.step.emit(job, JobEventKind::Finished, now);
@@ -86,12 +70,13 @@ void Lifecycle<D>::complete(JobSlot job_slot, Time now, Outcome outcome) {
     table_.step.emit(job, JobEventKind::Aborted, now, reason_of(outcome));
   }
   // The job used its budget and ended at one instant: drop its pending level change.
-  table_.step.drop(job_slot);
+  table_.step.drop(JobSlot(slot));
   dispatcher_.on_end(slot);
-  table_.free_slot(slot);
+  table_.free_slot(slot, task);
   if (outcome != Outcome::Finished || !task.joined || !takes_releases(task)) return;
 
-  table_.precedence.on_complete(id, release, origin, now, [this](TaskId successor) { use_data(successor); });
+  table_.precedence.on_complete(job.task, job.release, job.origin, now,
+                                [this](TaskId successor) { use_data(successor); });
 }
 
 // All data of the task is fresh: releases its job, or makes the one that waits for the data ready.
@@ -101,7 +86,7 @@ void Lifecycle<D>::use_data(TaskId id) {
   if (task.life != TaskLife::Live) return;
   if (!task.timer) {
     const Precedence::Data data = table_.precedence.consume(id);
-    restricted_ ? admit_or_refuse(id, data.complete, data.origin) : admit(id, data.complete, data.origin);
+    admit(id, data.complete, data.origin);
   } else if (task.waiting != kNil) {
     const bool has_data = table_.precedence.has_predecessors(id);
     make_ready(task.waiting, has_data ? table_.precedence.consume(id).origin : table_.jobs[task.waiting].release);
@@ -119,7 +104,7 @@ void Lifecycle<D>::preemption_point(JobSlot job, Time now) {
 template <Dispatcher D>
 void Lifecycle<D>::wait(JobSlot job, DeviceId device, Time now) {
   if constexpr (LetsWait<D>) {
-    REDAG_CHECK(job.value < table_.jobs.size(), "a job waits that does not exist");
+    REDAG_CHECK(table_.has(job), "a job waits that does not exist");
     REDAG_CHECK(!device.valid() || device.value < table_.devices.size(),
                 "a job waits for a device that does not exist");
     table_.step.begin(now);
@@ -132,8 +117,7 @@ void Lifecycle<D>::wait(JobSlot job, DeviceId device, Time now) {
 template <Dispatcher D>
 void Lifecycle<D>::wake(JobSlot job, Time now) {
   if constexpr (LetsWait<D>) {
-    REDAG_CHECK(job.value < table_.jobs.size() && table_.jobs[job.value].state == JobState::Away,
-                "a job wakes that no device serves");
+    REDAG_CHECK(table_.has(job) && table_.jobs[job.value].state == JobState::Away, "a job wakes that no device serves");
     table_.step.begin(now);
     dispatcher_.on_wake(job.value);
   } else {
@@ -144,6 +128,11 @@ void Lifecycle<D>::wake(JobSlot job, Time now) {
 template <Dispatcher D>
 Step Lifecycle<D>::dispatch(Time now, std::uint32_t most) {
   table_.step.begin(now);
+  return take_step(most);
+}
+
+template <Dispatcher D>
+Step Lifecycle<D>::take_step(std::uint32_t most) {
   dispatcher_.decide(most);
   if (table_.high_mode && dispatcher_.is_idle()) leave_high_mode();
   return table_.step.read();
@@ -151,11 +140,13 @@ Step Lifecycle<D>::dispatch(Time now, std::uint32_t most) {
 
 template <Dispatcher D>
 Step Lifecycle<D>::finish(JobSlot job, Time now, Outcome outcome, std::uint32_t most) {
+  REDAG_CHECK(table_.has(job) && table_.jobs[job.value].started(), "completion of a job that does not run");
   if constexpr (HandsOver<D>) {
     if (outcome == Outcome::Finished && !restricted_ && hand_over(job.value, now, most)) return table_.step.read();
   }
-  complete(job, now, outcome);
-  return dispatch(now, most);
+  table_.step.begin(now);
+  end(job.value, now, outcome);
+  return take_step(most);
 }
 
 // Direct hand-over: the job releases one data task and nothing else depends on its end, so that the new job takes its
@@ -165,7 +156,6 @@ Step Lifecycle<D>::finish(JobSlot job, Time now, Outcome outcome, std::uint32_t 
 template <Dispatcher D>
 bool Lifecycle<D>::hand_over(std::uint32_t slot, Time now, std::uint32_t most) {
   if constexpr (HandsOver<D>) {
-    REDAG_CHECK(slot < table_.jobs.size() && table_.jobs[slot].started(), "completion of a job that does not run");
     const Job &job = table_.jobs[slot];
     const TaskId heir = table_.precedence.heir(job.task);
     if (!heir.valid() || most == 0) return false;
@@ -179,12 +169,10 @@ bool Lifecycle<D>::hand_over(std::uint32_t slot, Time now, std::uint32_t most) {
     const Precedence::Data data = table_.precedence.hand_on(job.task, job.release, job.origin, now);
     REDAG_CHECK(next.free_slot != kNil, "a task without a waiting or ready job has no free slot");
     const std::uint32_t its_slot =
-        add_job(heir, next, count_release(next), data.complete, takes_turns_ ? data.origin : 0);
-    Job &its_job = table_.jobs[its_slot];
-    prepare(its_job, next, data.origin);
+        add_ready_job(heir, next, data.complete, data.origin, takes_turns_ ? data.origin : 0);
     if (table_.step.records(JobEventKind::Finished) || table_.step.records(JobEventKind::Released) ||
         table_.step.records(JobEventKind::Ready)) {
-      tell_hand_over(job, its_job, now);
+      tell_hand_over(job, table_.jobs[its_slot], now);
     }
     dispatcher_.replace(slot, its_slot, most);
     table_.free_slot(slot, task);
@@ -206,12 +194,30 @@ bool Lifecycle<D>::outranked(JobSlot job) const {
   return table_.config.preemption == Preemption::Cooperative && dispatcher_.outranked(table_.jobs[job.value]);
 }
 
-// A timer task with predecessors has its release as `origin` here, and gets that of its data when it is ready.
+// A job that no rule concerns: its task has no other that has not started, and needs no data.
 template <Dispatcher D>
 void Lifecycle<D>::admit(TaskId id, Time nominal, Time origin) {
   TaskState &task = table_.tasks[id.value];
-  DagState &dag = table_.dags[task.dag.value];
-  const std::uint32_t number = count_release(task);
+  if (restricted_ || task.is_special || task.ready_count > 0 || task.waiting != kNil) {
+    return admit_by_rules(id, nominal, origin);
+  }
+  table_.step.emit(id, static_cast<std::uint32_t>(task.released), WorkerId(), JobEventKind::Released, nominal);
+  const std::uint32_t slot = add_ready_job(id, task, nominal, origin, takes_turns_ ? origin : 0);
+  table_.count_ready(task, slot);
+  table_.step.emit(table_.jobs[slot], JobEventKind::Ready, origin);
+  dispatcher_.on_ready(slot);
+}
+
+// A timer task with predecessors has its release as `origin` here, and gets that of its data when it is ready.
+template <Dispatcher D>
+[[gnu::noinline]] void Lifecycle<D>::admit_by_rules(TaskId id, Time nominal, Time origin) {
+  if (closed_) return;
+  TaskState &task = table_.tasks[id.value];
+  if (restricted_) {
+    if (const Reason reason = refusal(task, nominal); reason != Reason::None) return refuse(id, nominal, reason);
+  }
+  const DagState &dag = table_.dags[task.dag.value];
+  const auto number = static_cast<std::uint32_t>(task.released);
   table_.step.emit(id, number, WorkerId(), JobEventKind::Released, nominal);
 
   const Time turn = takes_turns_ ? turn_of(task, origin) : 0;
@@ -225,29 +231,45 @@ void Lifecycle<D>::admit(TaskId id, Time nominal, Time origin) {
   const bool queue_is_full = task.queue_depth > 0 && task.ready_count >= task.queue_depth;
   const bool dag_is_full = dag.max_pending > 0 && dag.pending >= dag.max_pending;
   if (queue_is_full || dag_is_full) {
+    ++task.released;
     ++task.skipped;
     table_.step.emit(id, number, WorkerId(), JobEventKind::Skipped, 0,
                      queue_is_full ? Reason::QueueFull : Reason::DagFull);
     return;
   }
 
-  const std::uint32_t slot = add_job(id, task, number, nominal, turn);
+  const std::uint32_t slot = add_ready_job(id, task, nominal, origin, turn);
   table_.count_pending(task);
-  if (complete_set) {
-    make_ready(slot, has_data ? table_.precedence.consume(id).origin : origin);
-  } else {
-    table_.jobs[slot].state = JobState::Waiting;
-    task.waiting = slot;
-  }
+  table_.jobs[slot].state = JobState::Waiting;
+  if (complete_set) return make_ready(slot, has_data ? table_.precedence.consume(id).origin : origin);
+  task.waiting = slot;
 }
 
-// Gives the new job a slot.
+// Gives the task's next job a slot, and its place in the order of jobs.
 template <Dispatcher D>
-std::uint32_t Lifecycle<D>::add_job(TaskId id, TaskState &task, std::uint32_t number, Time nominal, Time turn) {
+std::uint32_t Lifecycle<D>::add_ready_job(TaskId id, TaskState &task, Time nominal, Time origin, Time turn) {
   const std::uint32_t slot = table_.take_slot(task);
-  table_.jobs[slot] =
-      Job{.task = id, .number = number, .release = nominal, .deadline = nominal + task.deadline, .turn = turn};
+  const Time deadline = nominal + task.deadline;
+  table_.jobs[slot] = Job{.task = id,
+                          .number = static_cast<std::uint32_t>(task.released++),
+                          .release = nominal,
+                          .deadline = deadline,
+                          .origin = origin,
+                          .key = key_of_next(task, deadline),
+                          .turn = turn,
+                          .sequence = next_sequence_++,
+                          .rank = task.rank,
+                          .priority_of = id,
+                          .state = JobState::Ready};
   return slot;
+}
+
+// Returns the key of a job that becomes ready now, with `next_sequence_`.
+template <Dispatcher D>
+std::int64_t Lifecycle<D>::key_of_next(const TaskState &task, Time deadline) const {
+  if (is_static(table_.config.policy)) return task.key;
+  if (task.degraded) return table_.demoted_key(task);
+  return table_.config.policy == PolicyKind::Edf ? deadline : static_cast<std::int64_t>(next_sequence_);
 }
 
 // Returns the turn of the task's next job (Ties::Share). A job that replaces another takes its turn: with its own,
@@ -261,32 +283,20 @@ Time Lifecycle<D>::turn_of(const TaskState &task, Time origin) const {
   return task.queue_depth == 0 ? earlier : std::max(origin, earlier);
 }
 
+// The job, which waited for its data, gets its place in the order of jobs.
 template <Dispatcher D>
 void Lifecycle<D>::make_ready(std::uint32_t slot, Time origin) {
   Job &job = table_.jobs[slot];
   TaskState &task = table_.task_of(job);
   if (task.waiting == slot) task.waiting = kNil;
   table_.count_ready(task, slot);
-  prepare(job, task, origin);
-  table_.step.emit(job, JobEventKind::Ready, origin);
-  dispatcher_.on_ready(slot);
-}
-
-// The job becomes ready, and gets its place in the order of jobs.
-template <Dispatcher D>
-void Lifecycle<D>::prepare(Job &job, const TaskState &task, Time origin) {
   job.state = JobState::Ready;
   job.origin = origin;
+  job.key = key_of_next(task, job.deadline);
   job.sequence = next_sequence_++;
-  job.priority_of = job.task;
   job.rank = task.rank;
-  switch (table_.config.policy) {
-    case PolicyKind::Edf: job.key = task.degraded ? table_.demoted_key(task) : job.deadline; break;
-    case PolicyKind::Fifo:
-      job.key = task.degraded ? table_.demoted_key(task) : static_cast<std::int64_t>(job.sequence);
-      break;
-    default: job.key = task.key; break;
-  }
+  table_.step.emit(job, JobEventKind::Ready, origin);
+  dispatcher_.on_ready(slot);
 }
 
 template <Dispatcher D>
@@ -299,10 +309,10 @@ void Lifecycle<D>::skip(std::uint32_t slot, Reason reason) {
   } else {
     task.waiting = kNil;
   }
-  --table_.dags[task.dag.value].pending;
+  table_.count_no_longer_pending(task);
   ++task.skipped;
   table_.step.emit(job, JobEventKind::Skipped, 0, reason);
-  table_.free_slot(slot);
+  table_.free_slot(slot, task);
 }
 
 template <Dispatcher D>
@@ -349,6 +359,7 @@ void Lifecycle<D>::set_predecessors(TaskId id, std::span<const TaskId> predecess
   REDAG_CHECK(id.value < table_.tasks.size() && !table_.tasks[id.value].on_grid,
               "new predecessors of a task that was not added alone");
   table_.step.begin(now);
+  if (!predecessors.empty() && table_.tasks[id.value].timer) table_.tasks[id.value].is_special = true;
   for (const TaskId from : predecessors) {
     REDAG_CHECK(from != id && from.value < table_.tasks.size() && !table_.tasks[from.value].on_grid,
                 "a predecessor that was not added alone");
@@ -374,7 +385,7 @@ void Lifecycle<D>::remove_dag(DagId dag, Time now) {
 
 template <Dispatcher D>
 void Lifecycle<D>::remove_task(TaskId task, Time now) {
-  REDAG_CHECK(task.value < table_.tasks.size(), "removal of a task that does not exist");
+  REDAG_CHECK(table_.has(task), "removal of a task that does not exist");
   table_.step.begin(now);
   if (table_.tasks[task.value].life != TaskLife::Live) return;
   table_.tasks[task.value].life = TaskLife::Removed;
@@ -385,7 +396,7 @@ void Lifecycle<D>::remove_task(TaskId task, Time now) {
 
 template <Dispatcher D>
 void Lifecycle<D>::set_timing(TaskId task, Duration period, Duration deadline, Time now) {
-  REDAG_CHECK(task.value < table_.tasks.size(), "a new period for a task that does not exist");
+  REDAG_CHECK(table_.has(task), "a new period for a task that does not exist");
   REDAG_CHECK(period > 0 && deadline > 0, "a task needs a period and a deadline");
   table_.step.begin(now);
   if (table_.tasks[task.value].life == TaskLife::Gone) return;

@@ -36,7 +36,7 @@ TEST(Lifecycle, AfterTheLastNumberComesTheFirst) {
   constexpr std::uint64_t kNumbers = std::uint64_t{1} << 32U;
   constexpr std::uint64_t kBefore = 2;
   Lifecycle<Idle> counter(make_workload({make_dag("d", {{"t", 10, 5}})}, 1, PreemptionMode::None), Config{});
-  counter.table().tasks[0].next_number = static_cast<std::uint32_t>(kNumbers - kBefore);
+  counter.table().tasks[0].released = kNumbers - kBefore;
   std::vector<std::uint32_t> numbers;
   for (Time now = 1; now <= 4; ++now) {
     counter.miss(TaskId(0), now, now, Reason::Overrun);

@@ -27,32 +27,35 @@ PriorityDispatcher::PriorityDispatcher(JobTable &table)
 
 // ---- decisions ----
 
-[[gnu::always_inline]] inline void PriorityDispatcher::decide(std::uint32_t most) {
+void PriorityDispatcher::place_ready_jobs(std::uint32_t most) {
   while (may_place()) {
     const std::uint32_t best = top();
-    if (best == kNil) break;
+    if (best == kNil) return;
     Job &job = table_.jobs[best];
-    const bool starts = !job.started();
-    if (starts && most == 0) {
-      if (!set_aside(best)) break;
+    if (job.started()) {
+      if (!resume(best, job)) return;
+      continue;
+    }
+    if (most == 0) {
+      if (!set_aside(best)) return;
       continue;
     }
     const Place place = find_place(job);
-    if (!place.worker.valid()) break;
-    if (!starts) {
-      resume(best, job, place);
-      continue;
-    }
-    if (park_if_not_eligible(best, job)) continue;
+    if (!place.worker.valid()) return;
+    TaskGates &gates = task_gates_[job.task.value];
+    if (park_if_not_eligible(best, job, gates)) continue;
     --most;
-    start(best, job, place);
+    start(best, job, gates, place);
   }
-  if (!open_workers_.empty()) close_open_workers();
-  if (held_back_ != kNil) put_back();
-  if (devices_.has_news()) devices_.serve();
 }
 
-[[gnu::noinline]] void PriorityDispatcher::decide_rest(std::uint32_t most) { decide(most); }
+// Does what the decision left: resumes jobs on open workers, puts back held-back jobs, and lets devices serve.
+void PriorityDispatcher::settle() {
+  unsettled_ = false;
+  if (!open_workers_.empty()) close_open_workers();
+  if (held_back_ != kNil) put_back();
+  devices_.serve();
+}
 
 // The new job holds the gates that both tasks share in the place of the ended one, for which no job waits. A free
 // worker that comes before the ended job's own would be the first choice.
@@ -75,12 +78,10 @@ PriorityDispatcher::PriorityDispatcher(JobTable &table)
   if (top_slot != kNil) {
     job.child = static_ ? list_of(job) : kNil;
     if (!is_ahead(job, table_.jobs[top_slot])) {
-      TaskState &task = table_.task_of(job);
-      table_.count_pending(task);
-      table_.count_ready(task, slot);
+      table_.count_ready(table_.task_of(job), slot);
       on_end(ended);
       push(slot);
-      return decide_rest(most);
+      return decide(most);
     }
   }
   const WorkerId worker = table_.jobs[ended].worker;
@@ -92,7 +93,7 @@ PriorityDispatcher::PriorityDispatcher(JobTable &table)
   workers_[worker.value].running = slot;
   workers_[worker.value].stack = slot;
   if (least_urgent_ != kNil) note_replaced(ended, slot);
-  if (top_slot != kNil) decide_rest(most - 1);
+  if (top_slot != kNil) decide(most - 1);
 }
 
 // No more jobs may start. Holds this job back and lets dispatch() look past it for started jobs, as long as there are
@@ -102,6 +103,7 @@ PriorityDispatcher::PriorityDispatcher(JobTable &table)
   remove(slot);
   table_.jobs[slot].next = held_back_;
   held_back_ = slot;
+  unsettled_ = true;
   return true;
 }
 
@@ -116,10 +118,7 @@ PriorityDispatcher::PriorityDispatcher(JobTable &table)
 
 // Finds where `job`, the first in the ready queue, could run now.
 inline PriorityDispatcher::Place PriorityDispatcher::find_place(const Job &job) {
-  if (!free_workers_.empty()) {
-    const bool last_is_free = job.worker.valid() && workers_[job.worker.value].stack == kNil;
-    return Place{last_is_free ? job.worker : WorkerId(free_workers_.first()), kNil};
-  }
+  if (!free_workers_.empty()) return Place{WorkerId(free_workers_.first()), kNil};
   if (table_.config.preemption == Preemption::None) return Place{};
   const std::uint32_t victim = least_urgent_running();
   if (victim == kNil || !outranks(job, table_.jobs[victim])) return Place{};
@@ -154,13 +153,13 @@ inline bool PriorityDispatcher::outranks(const Job &a, const Job &b) const {
 
 [[gnu::always_inline]] inline std::uint32_t PriorityDispatcher::level_of(const Job &job) const {
   if (!static_) return 0;
-  const auto key = static_cast<std::uint32_t>(job.key);
-  return level_of_key_.empty() ? std::min(key, table_.tier_count()) : level_of_key_[key];
+  return level_of_key_[static_cast<std::uint32_t>(job.key)];
 }
 
-[[gnu::always_inline]] inline void PriorityDispatcher::start(std::uint32_t slot, Job &job, Place place) {
+[[gnu::always_inline]] inline void PriorityDispatcher::start(std::uint32_t slot, Job &job, TaskGates &gates,
+                                                             Place place) {
   remove_unstarted(slot);
-  hold_gates(slot, job);
+  hold_gates(slot, gates);
   ++started_;
   make_way(place);
   if (table_.config.preemption == Preemption::Cooperative) job.under = place.victim;
@@ -168,12 +167,17 @@ inline bool PriorityDispatcher::outranks(const Job &a, const Job &b) const {
   occupy(place.worker, slot);
 }
 
-[[gnu::noinline]] void PriorityDispatcher::resume(std::uint32_t slot, Job &job, Place place) {
+// Returns false, and changes nothing, if there is no place for the job. Prefers the worker on which it ran last.
+[[gnu::noinline]] bool PriorityDispatcher::resume(std::uint32_t slot, Job &job) {
+  Place place = find_place(job);
+  if (!place.worker.valid()) return false;
+  if (place.victim == kNil && workers_[job.worker.value].stack == kNil) place.worker = job.worker;
   remove(slot);
   make_way(place);
   job.under = table_.config.preemption == Preemption::Cooperative ? place.victim : kNil;
   table_.resume(slot, place.worker, place.victim, level_of(job));
   occupy(place.worker, slot);
+  return true;
 }
 
 [[gnu::always_inline]] inline void PriorityDispatcher::occupy(WorkerId worker, std::uint32_t slot) {
@@ -221,8 +225,7 @@ bool PriorityDispatcher::is_idle() const { return top() == kNil && started_ == 0
 
 // A worker is available to the job. Parks the job if one of its gates is full. Tries the gates in the order task, DAG,
 // group, threads.
-inline bool PriorityDispatcher::park_if_not_eligible(std::uint32_t slot, const Job &job) {
-  const TaskGates &to_pass = task_gates_[job.task.value];
+inline bool PriorityDispatcher::park_if_not_eligible(std::uint32_t slot, const Job &job, const TaskGates &to_pass) {
   if (is_full(to_pass.own)) {
     park(slot, GateKind::Task, job.task.value);
     return true;
@@ -350,7 +353,7 @@ inline void PriorityDispatcher::leave_worker(const Job &job) {
   const Job &job = table_.jobs[slot];
   if (is_in_ready_queue(job)) return remove(slot);
   REDAG_CHECK(job.state != JobState::Suspended, "a job ended that is suspended under another");
-  devices_.leave(slot);
+  leave_device(slot);
 }
 
 // The job keeps its gates.
@@ -365,11 +368,18 @@ void PriorityDispatcher::on_wait(std::uint32_t slot, DeviceId device) {
     remove(slot);
   }
   table_.wait(slot, device);
-  if (device.valid()) devices_.join(slot);
+  if (!device.valid()) return;
+  devices_.join(slot);
+  unsettled_ = true;
+}
+
+void PriorityDispatcher::leave_device(std::uint32_t slot) {
+  devices_.leave(slot);
+  unsettled_ = true;
 }
 
 void PriorityDispatcher::on_wake(std::uint32_t slot) {
-  devices_.leave(slot);
+  leave_device(slot);
   table_.wake(slot);
   push(slot);
 }
@@ -378,6 +388,7 @@ void PriorityDispatcher::open(std::uint32_t worker) {
   if (workers_[worker].open) return;
   workers_[worker].open = true;
   open_workers_.push_back(worker);
+  unsettled_ = true;
 }
 
 // If the gate has room, its most urgent parked job goes back to the ready queue. Called once for each place that
@@ -403,8 +414,7 @@ inline std::uint32_t PriorityDispatcher::list_of(const Job &job) const {
   const auto key = static_cast<std::uint32_t>(job.key);
   const std::uint32_t level = level_of(job);
   if (!job.started() || table_.config.preemption != Preemption::Full) return key + level + 1;
-  const std::uint32_t first = level_of_key_.empty() ? level : first_of_level_[key];
-  return first + level;
+  return first_of_level_[key] + level;
 }
 
 inline void PriorityDispatcher::push(std::uint32_t slot) {
@@ -443,10 +453,11 @@ inline void PriorityDispatcher::remove_unstarted(std::uint32_t slot) {
   static_ ? levels_.remove(table_.jobs, slot) : heap_.remove(table_.jobs, slot);
 }
 
-void PriorityDispatcher::assign_levels() {
-  if (table_.config.levels == 0) return;
+// Returns the lowest level.
+std::uint32_t PriorityDispatcher::assign_levels() {
   const std::uint32_t tiers = table_.tier_count();
-  level_of_key_.assign(2 * std::size_t{tiers}, table_.config.levels);  // demoted jobs: below all others
+  const std::uint32_t lowest = table_.config.levels > 0 ? table_.config.levels : tiers;
+  level_of_key_.assign(2 * std::size_t{tiers}, lowest);  // demoted jobs: below all others
   for (const TaskState &task : table_.tasks) {
     if (task.life != TaskLife::Gone) level_of_key_[task.tier] = task.level;
   }
@@ -455,13 +466,15 @@ void PriorityDispatcher::assign_levels() {
     const bool is_first = key == 0 || level_of_key_[key] != level_of_key_[key - 1];
     first_of_level_[key] = is_first ? key : first_of_level_[key - 1];
   }
+  return lowest;
 }
 
 // Rebuilds gates, levels and the ready queue. Parked jobs go back to the ready queue and are parked again when tried.
 void PriorityDispatcher::on_reconfigured() {
-  assign_levels();
-  const std::size_t lowest = table_.config.levels > 0 ? table_.config.levels : table_.tier_count();
-  levels_ = LevelQueue(static_ ? 2 * std::size_t{table_.tier_count()} + lowest + 1 : 0);
+  if (static_) {
+    const std::size_t lowest = assign_levels();
+    levels_ = LevelQueue(level_of_key_.size() + lowest + 1);
+  }
   heap_ = HeapQueue();
   first_ = kNil;
   queued_started_ = 0;
@@ -499,7 +512,7 @@ void PriorityDispatcher::on_reconfigured() {
     if (!job.started()) continue;
     tell_level(slot, kNil);
     if (is_in_ready_queue(job)) push(slot);
-    hold_gates(slot, job);
+    hold_gates(slot, task_gates_[job.task.value]);
   }
   devices_.rebuild();
 }

@@ -34,7 +34,10 @@ class PriorityDispatcher {
   void on_wake(std::uint32_t slot);
   void on_reconfigured();
   void on_preemption_point(std::uint32_t slot) { open(table_.jobs[slot].worker.value); }
-  [[gnu::always_inline]] inline void decide(std::uint32_t most);
+  void decide(std::uint32_t most) {
+    if (may_place() && top() != kNil) place_ready_jobs(most);
+    if (unsettled_) settle();
+  }
   [[nodiscard]] bool share_gates(TaskId a, TaskId b) const {
     return task_gates_[a.value].shares_all_with(task_gates_[b.value]);
   }
@@ -90,17 +93,19 @@ class PriorityDispatcher {
   [[nodiscard]] bool outranks(const Job &a, const Job &b) const;
   [[nodiscard]] std::uint32_t level_of(const Job &job) const;
   void tell_level(std::uint32_t slot, std::uint32_t old_level);
-  void decide_rest(std::uint32_t most);
-  void start(std::uint32_t slot, Job &job, Place place);
-  void resume(std::uint32_t slot, Job &job, Place place);
+  void place_ready_jobs(std::uint32_t most);
+  void settle();
+  void start(std::uint32_t slot, Job &job, TaskGates &gates, Place place);
+  bool resume(std::uint32_t slot, Job &job);
   void occupy(WorkerId worker, std::uint32_t slot);
   void note_running(std::uint32_t slot);
   void note_replaced(std::uint32_t ended, std::uint32_t slot);
   void make_way(Place place);
   void leave_worker(const Job &job);
   void leave_queue(std::uint32_t slot);
+  void leave_device(std::uint32_t slot);
   [[nodiscard]] bool is_in_ready_queue(const Job &job) const;
-  bool park_if_not_eligible(std::uint32_t slot, const Job &job);
+  bool park_if_not_eligible(std::uint32_t slot, const Job &job, const TaskGates &to_pass);
   void park(std::uint32_t slot, GateKind kind, std::uint32_t position);
   void inherit(std::uint32_t holder, const Job &waiter);
   /// `change` changes the key of a started job.
@@ -110,7 +115,7 @@ class PriorityDispatcher {
   bool set_aside(std::uint32_t slot);
   void put_back();
 
-  void assign_levels();
+  std::uint32_t assign_levels();
   [[nodiscard]] std::uint32_t list_of(const Job &job) const;
   void push(std::uint32_t slot);
   void remove(std::uint32_t slot);
@@ -135,8 +140,7 @@ class PriorityDispatcher {
     for (std::uint32_t i = 0; i < gates.count; ++i) f(shared_gates_[gates.shared[i]]);
   }
   /// A started job holds its gates until it ends.
-  void hold_gates(std::uint32_t slot, const Job &job) {
-    TaskGates &gates = task_gates_[job.task.value];
+  void hold_gates(std::uint32_t slot, TaskGates &gates) {
     ++gates.own.used;
     for (std::uint32_t i = 0; i < gates.count; ++i) {
       Gate &gate = shared_gates_[gates.shared[i]];
@@ -155,7 +159,7 @@ class PriorityDispatcher {
   std::uint32_t first_ = kNil;
   std::uint32_t queued_started_ = 0;  // started jobs in the ready queue: preempted (Full), or woken
   std::uint32_t started_ = 0;         // jobs started and unfinished
-  // Where levels are limited: the level of each key, and the first key of that level. Empty: each tier is a level.
+  // Static policies: the level of each key, and the first key of that level.
   std::vector<std::uint32_t> level_of_key_;
   std::vector<std::uint32_t> first_of_level_;
   std::vector<TaskGates> task_gates_;  // by TaskId
@@ -166,6 +170,7 @@ class PriorityDispatcher {
   DeviceQueues devices_;
   std::uint32_t least_urgent_ = kNil;  // Full: the least urgent running job; kNil: not known
   std::uint32_t held_back_ = kNil;     // during decide(): held-back jobs, linked by Job::next; they may not start
+  bool unsettled_ = false;             // settle() has something to do
 };
 
 /// Limited levels require a static policy.

@@ -28,9 +28,9 @@ class StepEntries {
     room_ = std::move(room);
     capacity_ = count;
   }
-  void clear() { count_ = 0; }
   [[nodiscard]] bool empty() const { return count_ == 0; }
-  [[nodiscard]] std::span<const T> all() const { return {room_.get(), count_}; }
+  /// Returns all entries, which stay where they are until the next one is added.
+  [[nodiscard]] std::span<const T> take() { return {room_.get(), std::exchange(count_, 0)}; }
 
   [[gnu::always_inline]] void add(const T &entry) {
     if (count_ == capacity_) grow();
@@ -52,23 +52,19 @@ class StepEntries {
 
 class StepBuilder {
  public:
-  /// Advances the time to `now`. The first call after read() also begins a new step. Each public call of a scheduler
-  /// that reports an event begins with it.
+  /// Advances the time to `now`. Each public call of a scheduler that reports an event begins with it.
   void begin(Time now) {
     now_ = std::max(now_, now);
-    if (!was_read_) return;
-    was_read_ = false;
-    events_.clear();
-    dispatches_.clear();
+    is_new_ = false;
   }
 
   /// Returns true if nothing was reported since the last read().
-  [[nodiscard]] bool is_new() const { return was_read_; }
+  [[nodiscard]] bool is_new() const { return is_new_; }
 
-  /// Returns the step: the result of dispatch().
+  /// Returns the step, which is the result of dispatch(), and begins a new one.
   [[nodiscard]] Step read() {
-    was_read_ = true;
-    return Step{dispatches_.all(), events_.all()};
+    is_new_ = true;
+    return Step{dispatches_.take(), events_.take()};
   }
 
   [[nodiscard]] Time now() const { return now_; }
@@ -137,7 +133,7 @@ class StepBuilder {
   StepEntries<Dispatch> dispatches_;
   EventKinds recorded_ = EventKinds::all();
   Time now_ = 0;
-  bool was_read_ = false;
+  bool is_new_ = false;
 };
 
 }  // namespace redag::sched
