@@ -33,9 +33,9 @@ void ThreadPriorities::end(std::size_t thread) {
   --started_;
 }
 
-std::span<const ThreadPriorities::Change> ThreadPriorities::follow(std::size_t thread, int priority, bool is_short) {
-  leave(threads_[thread]);
-  return place(threads_[thread], priority, is_short);
+std::span<const ThreadPriorities::Change> ThreadPriorities::end_and_place(Thread &self, int priority, bool is_short) {
+  leave(self);
+  return place(self, priority, is_short);
 }
 
 std::span<const ThreadPriorities::Change> ThreadPriorities::wait(std::size_t thread, int priority) {

@@ -6,6 +6,7 @@
 // while that makes no difference among these threads. A value without threads of its own. Not thread-safe.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -35,7 +36,15 @@ class ThreadPriorities {
   std::span<const Change> change(std::size_t thread, int priority);
   void end(std::size_t thread);
   /// As end() and start(): the job of a thread is followed by another one.
-  std::span<const Change> follow(std::size_t thread, int priority, bool is_short);
+  std::span<const Change> follow(std::size_t thread, int priority, bool is_short) {
+    Thread &self = threads_[thread];
+    if (!unordered_ && self.of_job == priority && self.priority == priority) return {};
+    // The only thread that has a job keeps the priority that it has kept.
+    const bool keeps = is_short && started_ == 1 && self.priority > std::max(priority, self.of_job);
+    if (!keeps || unordered_) return end_and_place(self, priority, is_short);
+    self.of_job = priority;
+    return {};
+  }
   /// A thread without a job waits with this priority. Its next job, if short, does not keep it.
   std::span<const Change> wait(std::size_t thread, int priority);
 
@@ -77,6 +86,7 @@ class ThreadPriorities {
     std::array<std::uint64_t, kPriorities / 64> mask_{};  // two words: any() knows
   };
 
+  std::span<const Change> end_and_place(Thread &self, int priority, bool is_short);
   std::span<const Change> place(Thread &self, int priority, bool is_short);
   [[nodiscard]] bool may_keep(const Thread &self, bool all_run);
   [[nodiscard]] bool overlaps_any(const Thread &self) const;
