@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "redag/base/check.hpp"
-#include "redag/base/lines.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag_analysis/metrics/check/trace_checker.hpp"
 #include "redag_analysis/metrics/files/jobs_csv.hpp"
@@ -80,7 +79,8 @@ std::string packed(std::string_view bytes) {
 // Makes a file of its parts before compression, which random bytes rarely survive: a line that describes the run; a
 // byte for the number of events; a code of events.
 std::string file_of_parts(std::string_view input) {
-  const std::string_view run = next_line(input);
+  const std::string_view run = input.substr(0, input.find('\n'));
+  input.remove_prefix(std::min(input.size(), run.size() + 1));
   const std::uint64_t events = input.empty() ? 0 : static_cast<unsigned char>(input.front());
   const std::string_view code = input.substr(std::min<std::size_t>(input.size(), 1));
   std::string file(kMagic);
