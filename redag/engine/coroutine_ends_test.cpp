@@ -179,7 +179,7 @@ TEST_P(CoroutineEnds, EndStartedCancelsWaitsAndJobsCanWaitAgain) {
     engine_->resume();
   }
   EXPECT_EQ(went_on, 0);
-  EXPECT_EQ(engine_->accounting(TaskId(0)).aborted, 0U) << "cancelled jobs are in flight";
+  EXPECT_EQ(engine_->figures(TaskId(0)).jobs.aborted, 0U) << "cancelled jobs are in flight";
   release(0);
   wait_for([&] { return waiting == 7; });
   event.set();
@@ -230,7 +230,7 @@ TEST_P(CoroutineEnds, AJobHasOneCoroutineAtATime) {
   };
   for (const std::uint32_t task : {0U, 1U}) {
     release(task);
-    wait_for([&] { return engine_->accounting(TaskId(task)).aborted == 1; });
+    wait_for([&] { return engine_->figures(TaskId(task)).jobs.aborted == 1; });
   }
   engine_->join();
   EXPECT_NE(thrown_.find("second coroutine"), std::string::npos) << thrown_;

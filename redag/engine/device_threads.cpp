@@ -17,7 +17,8 @@ thread_local const DeviceThreads *devices_of_this_thread = nullptr;
 
 bool DeviceThreads::is_this_thread() const { return devices_of_this_thread == this; }
 
-DeviceThreads::DeviceThreads(const std::vector<Device> &devices) : devices_(devices), states_(devices.size()) {
+DeviceThreads::DeviceThreads(std::span<const Device> devices)
+    : devices_(devices.begin(), devices.end()), states_(devices.size()) {
   for (std::size_t d = 0; d < devices.size(); ++d) {
     for (std::uint32_t slot = 0; slot < devices[d].slots; ++slot) {
       threads_.push_back(std::make_unique<DeviceThread>());

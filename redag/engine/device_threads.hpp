@@ -23,6 +23,7 @@ namespace redag::runtime {
 
 /// The figures of one device for a live view.
 struct DeviceFigures {
+  Device device;
   std::uint32_t queued = 0;    // jobs that asked it and are not served yet
   std::uint64_t served = 0;    // services that have ended
   Duration busy = 0;           // time of all its services, in progress or ended
@@ -44,7 +45,7 @@ class DeviceThreads {
   /// Called at the end of each service, on the thread that served. What was served may not be touched afterwards.
   using Served = std::function<void(DeviceThread &thread, JobSlot job)>;
 
-  explicit DeviceThreads(const std::vector<Device> &devices);
+  explicit DeviceThreads(std::span<const Device> devices);
 
   /// Creates the threads, named `name`-DEVICE. They begin and end services at `priority`. Error: what the system
   /// refused; call end().
@@ -63,7 +64,15 @@ class DeviceThreads {
   void end_service(DeviceThread &thread, Time now);
   /// Returns true if the calling thread is one of them. After start().
   [[nodiscard]] bool is_this_thread() const;
-  /// Sets the figures of all devices, by DeviceId, without allocating if each `serves` has room for the slots.
+  /// Makes room for the figures of all devices, and says which devices they are.
+  void reserve(std::vector<DeviceFigures> &out) const {
+    out.resize(devices_.size());
+    for (std::size_t d = 0; d < out.size(); ++d) {
+      out[d].device = devices_[d];
+      out[d].serves.reserve(devices_[d].slots);
+    }
+  }
+  /// Sets the figures of all devices, by DeviceId, without allocating after reserve().
   void figures(Time now, std::vector<DeviceFigures> &out) const;
 
  private:

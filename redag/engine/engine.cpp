@@ -30,17 +30,17 @@ constexpr Duration kPatience = 200 * kMicrosecond;
 
 Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions options)
     : options_(std::move(options)),
-      lock_(realtime(), LockClass::Bounded),
+      realtime_(os() || options_.realtime_threads),
+      lock_(realtime_, LockClass::Bounded),
       scheduler_(std::move(scheduler)),
       pool_(os() ? options_.config.max_started : options_.config.workers + options_.spare_threads,
             options_.trace_capacity),
       tasks_(options_.measure),
       lookout_(posts_silently() ? std::make_unique<HelperThread>() : nullptr),
-      devices_(options_.devices),
+      devices_(scheduler_->devices()),
       waiting_(devices_),
       placement_(pool_, waiting_, os(), options_.band, lookout_ ? &lookout_->parker : nullptr,
                  os() ? sched::kNoLimit : options_.spare_threads),
-      paused_(options_.start_paused),
       decisions_(options_.trace_capacity) {
   const sched::Config &config = options_.config;
   REDAG_CHECK(!os() || config.max_started >= config.workers, "mode os needs at least one thread for every processor");
@@ -88,7 +88,7 @@ Result<void> Engine::start() {
 }
 
 Result<void> Engine::start_threads(const std::vector<int> &cpus) {
-  const ThreadSetup setup{options_.name, realtime() ? options_.band.top_job : 0, cpus, options_.touched_stack};
+  const ThreadSetup setup{options_.name, realtime_ ? options_.band.top_job : 0, cpus, options_.touched_stack};
   Result<void> started = pool_.start(setup, [this](WorkerThread &self) { main(self); });
   if (started && order_thread_) started = start_order();
   if (started && lookout_) {
@@ -193,10 +193,10 @@ void Engine::look_out() noexcept {
 // ---- decisions ----
 
 // `taker` is the calling thread, or null if it cannot take a job.
-void Engine::decide(Locked &locked, Time now, Taker *taker, Sender sender) {
+void Engine::decide(Locked &locked, Time now, Taker *taker) {
   // While paused, only run_one() starts a job, on the caller's thread.
   const std::uint32_t for_caller = taker != nullptr && &taker->thread == &pool_.caller() ? 1 : 0;
-  carry_out(locked, scheduler_->dispatch(now, may_start() ? sched::kNoLimit : for_caller), now, taker, sender);
+  carry_out(locked, scheduler_->dispatch(now, std::max(most_to_start(), for_caller)), now, taker);
 }
 
 // Passes a step of the scheduler on to the threads.
@@ -238,11 +238,8 @@ void Engine::refresh_outranked() {
 
 // ---- events from outside ----
 
-void Engine::release(std::span<const Release> releases) { release_at(releases, now()); }
-
-void Engine::release(TaskId task, Time nominal) { release(Release{task, nominal}, now()); }
-
-void Engine::release_at(std::span<const Release> releases, Time at) {
+void Engine::release(std::span<const Release> releases) {
+  const Time at = now();
   Locked locked(*this, releases.size());
   withdraw_if_halting(locked);
   if (halted_at_ != kNever) return;
@@ -250,19 +247,35 @@ void Engine::release_at(std::span<const Release> releases, Time at) {
   do {
     const auto lot = releases.first(std::min(releases.size(), sched::kMostReleasesAtOnce));
     for (const Release &release : lot) scheduler_->release(release.task, release.nominal, at, release.origin);
-    decide(locked, at, nullptr, sender);
+    decide_after_release(locked, at, sender);
     releases = releases.subspan(lot.size());
   } while (!releases.empty());
 }
 
+void Engine::release(const Release &release, Time at) {
+  Locked locked(*this);
+  withdraw_if_halting(locked);
+  if (halted_at_ != kNever) return;
+  const Sender sender = lookout_ ? note_release(at) : nullptr;
+  scheduler_->release(release.task, release.nominal, at, release.origin);
+  decide_after_release(locked, at, sender);
+}
+
+// Mostly all workers have jobs, and nothing is to be done.
+[[gnu::always_inline]] inline void Engine::decide_after_release(Locked &locked, Time at, Sender sender) {
+  const sched::Step step = scheduler_->dispatch(at, most_to_start());
+  if (!step.events.empty() || !step.dispatches.empty() || !may_hand_over())
+    carry_out(locked, step, at, nullptr, sender);
+}
+
 void Engine::receive(const Release &message, Time at) {
   const RunningJob *const job = current_job();
-  Locked locked(*this, 1);
+  Locked locked(*this);
   withdraw_if_halting(locked);
   if (halted_at_ != kNever) return;
   const Sender sender = lookout_ ? note_release(at) : nullptr;
   scheduler_->receive(message.task, job == nullptr ? TaskId() : job->task, message.nominal, at, message.origin);
-  decide(locked, at, nullptr, sender);
+  decide_after_release(locked, at, sender);
 }
 
 // Notes when the calling job first releases another. Returns its thread if it is expected to end soon and then takes a
@@ -378,25 +391,26 @@ std::uint64_t Engine::thread_waits() const {
   return scheduler_->thread_waits();
 }
 
-std::uint64_t Engine::refused_priorities() const {
-  const LockGuard guard(lock_);
-  return placement_.refused_priorities();
-}
-
 std::vector<Problem> Engine::problems() const {
+  std::uint64_t refused = 0;
+  std::uint64_t waits = 0;
+  std::string of_order;
+  {
+    const LockGuard guard(lock_);
+    refused = placement_.refused_priorities();
+    waits = scheduler_->thread_waits();
+    of_order = order_problem_;
+  }
   std::vector<Problem> problems;
-  if (const std::uint64_t changes = refused_priorities(); changes > 0) {
+  if (refused > 0) {
     problems.push_back({fmt::format("the system refused {} changes of a thread's priority, so jobs may wait for less "
                                     "urgent ones (the process needs the right to real-time priorities, CAP_SYS_NICE or "
                                     "rtprio, for as long as it runs)",
-                                    changes),
+                                    refused),
                         true});
   }
-  {
-    const LockGuard guard(lock_);
-    if (!order_problem_.empty()) problems.push_back({order_problem_, true});
-  }
-  if (const std::uint64_t waits = thread_waits(); waits > 0) {
+  if (!of_order.empty()) problems.push_back({of_order, true});
+  if (waits > 0) {
     problems.push_back(
         {fmt::format("jobs waited for a thread {} times, because all {} threads had jobs in progress "
                      "(raise 'threads')",

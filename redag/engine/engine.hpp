@@ -63,7 +63,6 @@ struct EngineOptions {
   std::vector<int> cpus;           // processors for the worker threads; empty: any, with `os` m of them
   std::size_t trace_capacity = 0;  // events that the rings hold between two drain(); 0: no events
   ExceptionHandler on_exception;   // empty: exceptions are only counted
-  bool start_paused = false;       // as after pause()
   bool measure = false;            // figures() includes responses and preemptions
   MissLog *misses = nullptr;       // every miss is noted there; must outlive the engine
   // none, cooperative: how many spins a thread without a job makes before it sleeps; see spins_in().
@@ -72,7 +71,6 @@ struct EngineOptions {
   // job has a thread of its own.
   std::uint32_t spare_threads = 0;
   std::size_t touched_stack = 0;  // bytes of each worker thread's stack; see ThreadSetup
-  std::vector<Device> devices;    // those with which the scheduler was built
   // SCHED_FIFO priority of the threads that wake jobs and serve them at devices; 0: ordinary threads.
   int waits_priority = 0;
 };
@@ -172,9 +170,9 @@ class Engine {
   /// Releases jobs of timer tasks, all at this instant. More than sched::kMostReleasesAtOnce are split into lots, one
   /// after the other. Decisions are carried out before it returns. Nothing allocates under the lock.
   void release(std::span<const Release> releases);
-  void release(TaskId task, Time nominal);
   /// As above, for a caller that has just read now(): the job arrives at `at`.
-  void release(const Release &release, Time at) { release_at(std::span(&release, 1), at); }
+  void release(const Release &release, Time at);
+  void release(TaskId task, Time nominal) { release(Release{task, nominal}, now()); }
   /// Reports that a message for a data task came at message.nominal (sched::Scheduler::receive); the calling thread
   /// read now() as `at`. A job of this engine that the thread is in sends it.
   void receive(const Release &message, Time at);
@@ -244,8 +242,6 @@ class Engine {
   /// point. Appends jobs that are overdue at `as_of` (relative to the origin), each once.
   void watch(const WatchLimits &limits, Time as_of, std::vector<OverdueJob> &out);
 
-  [[nodiscard]] sched::Accounting accounting(TaskId task) const;
-  [[nodiscard]] Usage usage(TaskId task) const;
   [[nodiscard]] TaskFigures figures(TaskId task) const;
   /// Replaces `out` by the figures of all worker threads, in their order.
   void figures(std::vector<ThreadFigures> &out) const;
@@ -255,10 +251,6 @@ class Engine {
   [[nodiscard]] std::uint64_t thread_waits() const;
   /// What is not as promised, the worst first. The one list for all front ends.
   [[nodiscard]] std::vector<Problem> problems() const;
-  /// Priority changes that the system refused while running, because rights were taken away.
-  [[nodiscard]] std::uint64_t refused_priorities() const;
-  /// Returns true if the calling thread is inside one of this engine's bodies.
-  [[nodiscard]] bool in_body() const noexcept { return current_job() != nullptr; }
   /// Returns true if the calling thread serves a job at one of this engine's devices.
   [[nodiscard]] bool in_service() const { return devices_.is_this_thread(); }
   /// The job that the calling thread runs in this engine, the topmost one of several. Null outside bodies.
@@ -288,7 +280,6 @@ class Engine {
   }
   void update_statement();
   void end_threads();
-  void release_at(std::span<const Release> releases, Time at);
   void main(WorkerThread &self) noexcept;
   void idle(WorkerThread &self) noexcept;
   void lead(WorkerThread &self) noexcept;
@@ -315,7 +306,8 @@ class Engine {
 
   void report_limits(RunningJob &job, Duration used, Time now) REDAG_REQUIRES(lock_);
   bool tell_limits(RunningJob &job, Duration used, Time now, bool from_outside) REDAG_REQUIRES(lock_);
-  void decide(Locked &locked, Time now, Taker *taker = nullptr, Sender sender = nullptr) REDAG_REQUIRES(lock_);
+  void decide(Locked &locked, Time now, Taker *taker = nullptr) REDAG_REQUIRES(lock_);
+  void decide_after_release(Locked &locked, Time at, Sender sender) REDAG_REQUIRES(lock_);
   void carry_out(Locked &locked, const sched::Step &step, Time now, Taker *taker, Sender sender = nullptr)
       REDAG_REQUIRES(lock_);
   Sender note_release(Time at) REDAG_REQUIRES(lock_);
@@ -334,14 +326,15 @@ class Engine {
   /// Returns true if a thread may begin its next job without carry_out(): preemption points need not know of it.
   [[nodiscard]] bool may_hand_over() const { return options_.config.preemption != sched::Preemption::Cooperative; }
   [[nodiscard]] bool may_start() const REDAG_REQUIRES(lock_) { return running_ && !paused_; }
+  [[nodiscard]] std::uint32_t most_to_start() const REDAG_REQUIRES(lock_) { return may_start() ? sched::kNoLimit : 0; }
 
   [[nodiscard]] bool os() const { return options_.config.preemption == sched::Preemption::Full; }
-  [[nodiscard]] bool realtime() const { return os() || options_.realtime_threads; }
   [[nodiscard]] bool posts_silently() const {
     return (os() || !options_.realtime_threads) && options_.config.workers > 1;
   }
 
   EngineOptions options_;
+  const bool realtime_;  // the threads that run jobs are SCHED_FIFO
   mutable PiMutex lock_;
   std::unique_ptr<sched::Scheduler> scheduler_ REDAG_PT_GUARDED_BY(lock_);
   WorkerPool pool_;
@@ -352,7 +345,7 @@ class Engine {
   WaitingJobs waiting_ REDAG_GUARDED_BY(lock_);
   JobPlacement placement_ REDAG_GUARDED_BY(lock_);
   bool running_ REDAG_GUARDED_BY(lock_) = false;  // the threads have been started
-  bool paused_ REDAG_GUARDED_BY(lock_);
+  bool paused_ REDAG_GUARDED_BY(lock_) = false;
   std::uint32_t pause_waiters_ REDAG_GUARDED_BY(lock_) = 0;
   FutexWord pause_changes_{0};  // counts what wait_paused() waits for; written under the lock
   Time halted_at_ REDAG_GUARDED_BY(lock_) = kNever;

@@ -94,7 +94,7 @@ class EngineClock : public ::testing::TestWithParam<PreemptionMode> {
       }
     }
   }
-  std::uint64_t finished(std::size_t task) const { return engine_->accounting(TaskId(task)).finished; }
+  std::uint64_t finished(std::size_t task) const { return engine_->figures(TaskId(task)).jobs.finished; }
 
   const PriorityBand band_ = probe_priority_band();
   std::unique_ptr<Engine> engine_;
@@ -136,9 +136,9 @@ TEST_P(EngineClock, NorDoShortJobsThatCloseThemselves) {
   EXPECT_EQ(asked(), asked_before);
   // What follows is not the job's.
   lingers = true;
-  const Duration total = engine_->usage(TaskId(0)).total;
+  const Duration total = engine_->figures(TaskId(0)).usage.total;
   run(0, {0});
-  EXPECT_EQ(engine_->usage(TaskId(0)).total, total + charged);
+  EXPECT_EQ(engine_->figures(TaskId(0)).usage.total, total + charged);
 }
 
 // A job that is charged on trust is charged more than it used. The next one must not be charged less for it.
@@ -159,7 +159,7 @@ TEST_P(EngineClock, TrustDoesNotShortenTheNextJob) {
   const Release both[] = {{TaskId(0), engine_->now()}, {TaskId(1), engine_->now()}};
   engine_->release(both);
   while (finished(1) == 0) std::this_thread::yield();
-  EXPECT_GE(engine_->usage(TaskId(1)).longest, kDemand);
+  EXPECT_GE(engine_->figures(TaskId(1)).usage.longest, kDemand);
 }
 
 TEST_P(EngineClock, JobsWithABudgetAreMeasuredThoughTheyCloseThemselves) {

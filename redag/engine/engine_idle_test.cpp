@@ -57,9 +57,9 @@ class Leader : public ::testing::TestWithParam<PreemptionMode> {
     return monotonic_now() + kMillisecond;
   }
   void run_one_job() {
-    const std::uint64_t before = engine_->accounting(TaskId(1)).finished;
+    const std::uint64_t before = engine_->figures(TaskId(1)).jobs.finished;
     engine_->release(TaskId(1), engine_->now());
-    while (engine_->accounting(TaskId(1)).finished == before) std::this_thread::yield();
+    while (engine_->figures(TaskId(1)).jobs.finished == before) std::this_thread::yield();
   }
 
   const PriorityBand band_ = probe_priority_band();
@@ -87,7 +87,7 @@ TEST_P(Leader, RunsTheJobThatItReleases) {
     });
     run_one_job();
     due = true;
-    while (engine_->accounting(TaskId(0)).finished == 0) std::this_thread::yield();
+    while (engine_->figures(TaskId(0)).jobs.finished == 0) std::this_thread::yield();
     EXPECT_EQ(releaser.load(), runner.load());
     end();
   }
@@ -110,7 +110,7 @@ TEST_P(Leader, LeavesReleasesToTheThreadWhileItHasAJob) {
   std::atomic<bool> released{false};
   on_expire_ = [&] {
     if (!due.exchange(false)) return;
-    EXPECT_FALSE(engine_->in_body());
+    EXPECT_EQ(engine_->current_job(), nullptr);
     released = true;
   };
   start(1, [&](const Job &job) {
@@ -123,7 +123,7 @@ TEST_P(Leader, LeavesReleasesToTheThreadWhileItHasAJob) {
   ASSERT_TRUE(releases_.start({"timer", mode() == PreemptionMode::Os ? band_.timer : 0, {}}));
   run_one_job();
   engine_->release(TaskId(0), engine_->now());
-  while (engine_->accounting(TaskId(0)).finished == 0) std::this_thread::yield();
+  while (engine_->figures(TaskId(0)).jobs.finished == 0) std::this_thread::yield();
   end();
 }
 
@@ -145,7 +145,7 @@ TEST_P(Leader, WaitsAboveAllJobsAndRunsItsOwnAtTheirLevel) {
   for (int i = 0; i < 20; ++i) run_one_job();  // short jobs: their threads may keep a priority of jobs
   for (std::uint64_t i = 0; i < 20; ++i) {
     due = true;
-    while (engine_->accounting(TaskId(0)).finished == i) std::this_thread::yield();
+    while (engine_->figures(TaskId(0)).jobs.finished == i) std::this_thread::yield();
     EXPECT_EQ(waits_at, band_.timer);
     EXPECT_GT(runs_at, 0);
     EXPECT_LE(runs_at, band_.top_job);

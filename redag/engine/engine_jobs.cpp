@@ -145,9 +145,12 @@ inline Outcome Engine::call(const Assignment &assignment, RunningJob &running) {
     entry.count(running.charged, running.earlier + at - running.here_since);
     if (running.released != kNever) entry.count_tail(at - running.released);
     self.used += running.charged - running.before;
-    if (finished && response > entry.deadline) count_late(job, entry, at);
-    if (finished && end_to_end > entry.dag_deadline) ++entry.late_end_to_end;
-    if (running.cancelled) ++entry.cancelled;
+    if (finished) {
+      if (response > entry.deadline) count_late(job, entry, at);
+      if (end_to_end > entry.dag_deadline) ++entry.late_end_to_end;
+    } else if (running.cancelled) {
+      ++entry.cancelled;
+    }
     if (options_.misses != nullptr && !running.cancelled) note_misses(locked, job, entry, at, outcome);
     --entry.busy;
     if (entry.removed && entry.busy == 0) doomed.swap(entry.body);
@@ -155,7 +158,7 @@ inline Outcome Engine::call(const Assignment &assignment, RunningJob &running) {
       running.used_budget = running.used_budget || outcome == Outcome::BudgetExceeded;
       report_limits(running, running.charged, at);
     }
-    const sched::Step step = scheduler_->finish(running.slot, at, outcome, may_start() ? sched::kNoLimit : 0);
+    const sched::Step step = scheduler_->finish(running.slot, at, outcome, most_to_start());
     if (may_hand_over() && placement_.hand_over(taker, step, tasks_, locked.waited())) {
       if (!step.events.empty()) report(locked, step.events);
     } else {

@@ -54,7 +54,7 @@ class ShortJobs : public ::testing::TestWithParam<PreemptionMode> {
     }
   }
 
-  std::uint64_t finished(std::size_t task) const { return engine_->accounting(TaskId(task)).finished; }
+  std::uint64_t finished(std::size_t task) const { return engine_->figures(TaskId(task)).jobs.finished; }
 
   const PriorityBand band_ = probe_priority_band();
   std::unique_ptr<Engine> engine_;
@@ -70,7 +70,7 @@ TEST_P(ShortJobs, OneThatSleepsAllTheSameIsNotChargedForIt) {
   run(0, kEnoughShortJobs);
   sleeps = true;
   run(0, 3);
-  EXPECT_LT(engine_->usage(TaskId(0)).longest, 25 * kMillisecond);
+  EXPECT_LT(engine_->figures(TaskId(0)).usage.longest, 25 * kMillisecond);
 }
 
 TEST_P(ShortJobs, OneThatComputesAllTheSameIsChargedForIt) {
@@ -85,11 +85,11 @@ TEST_P(ShortJobs, OneThatComputesAllTheSameIsChargedForIt) {
     return Outcome::Finished;
   }});
   run(0, kEnoughShortJobs);
-  EXPECT_GT(engine_->usage(TaskId(0)).total, 0);
+  EXPECT_GT(engine_->figures(TaskId(0)).usage.total, 0);
   demand = 2 * kMillisecond;
   run(0);
-  EXPECT_GE(engine_->usage(TaskId(0)).longest, demand);
-  EXPECT_LT(engine_->usage(TaskId(0)).longest, 100 * demand);
+  EXPECT_GE(engine_->figures(TaskId(0)).usage.longest, demand);
+  EXPECT_LT(engine_->figures(TaskId(0)).usage.longest, 100 * demand);
 }
 
 TEST_P(ShortJobs, AJobIsNotChargedForTheOneBefore) {
@@ -103,9 +103,9 @@ TEST_P(ShortJobs, AJobIsNotChargedForTheOneBefore) {
   const Release both[] = {{TaskId(0), engine_->now()}, {TaskId(1), engine_->now()}};
   engine_->release(both);
   while (finished(1) == 0) std::this_thread::yield();
-  EXPECT_GE(engine_->usage(TaskId(0)).longest, 20 * kMillisecond);
-  EXPECT_GE(engine_->usage(TaskId(1)).longest, 100 * kMicrosecond);
-  EXPECT_LT(engine_->usage(TaskId(1)).longest, 10 * kMillisecond);
+  EXPECT_GE(engine_->figures(TaskId(0)).usage.longest, 20 * kMillisecond);
+  EXPECT_GE(engine_->figures(TaskId(1)).usage.longest, 100 * kMicrosecond);
+  EXPECT_LT(engine_->figures(TaskId(1)).usage.longest, 10 * kMillisecond);
 }
 
 // What a body releases shortly before its end is left to its own thread. If it goes on all the same, another worker
@@ -122,7 +122,7 @@ TEST_P(ShortJobs, WhatAJobReleasesStartsBesideItIfItGoesOn) {
       release(0);
       return Outcome::Finished;
     }
-    const auto last = static_cast<std::int64_t>(engine_->accounting(TaskId(1)).released) - 1;
+    const auto last = static_cast<std::int64_t>(engine_->figures(TaskId(1)).jobs.released) - 1;
     for (int ms = 0; ms < 10'000 && latest < last; ++ms) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     seen = latest == last;
     ended = true;

@@ -132,19 +132,6 @@ void Engine::register_task(TaskId id, const Task &task, const TaskRole &role, Bo
   waiting_.reserve(tasks_.most_started());
 }
 
-sched::Accounting Engine::accounting(TaskId task) const {
-  const LockGuard guard(lock_);
-  sched::Accounting accounting = scheduler_->accounting(task);
-  accounting.skipped -= tasks_[task].withdrawn;
-  accounting.aborted -= tasks_[task].cancelled;
-  return accounting;
-}
-
-Usage Engine::usage(TaskId task) const {
-  const LockGuard guard(lock_);
-  return tasks_[task].usage;
-}
-
 TaskFigures Engine::figures(TaskId task) const {
   const LockGuard guard(lock_);
   const TaskEntry &entry = tasks_[task];
@@ -178,8 +165,7 @@ void Engine::figures(std::vector<ThreadFigures> &out) const {
 }
 
 void Engine::figures(std::vector<DeviceFigures> &out) const {
-  out.resize(options_.devices.size());
-  for (std::size_t d = 0; d < out.size(); ++d) out[d].serves.reserve(options_.devices[d].slots);
+  devices_.reserve(out);
   const LockGuard guard(lock_);
   devices_.figures(now(), out);
 }

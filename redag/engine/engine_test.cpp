@@ -83,7 +83,7 @@ class Bench {
       if (event.kind == JobEventKind::Released) ++released[event.task.value];
     }
     for (std::size_t t = 0; t < workload_.task_count(); ++t) {
-      EXPECT_EQ(engine->accounting(TaskId(t)).released, released[t]);
+      EXPECT_EQ(engine->figures(TaskId(t)).jobs.released, released[t]);
     }
   }
 
@@ -183,9 +183,9 @@ TEST_P(EngineInEveryMode, AfterAHaltNothingStartsAndWhatStartedEnds) {
   go.set();
   bench.finish();
   EXPECT_EQ(bench.log(), "+2 -2");
-  EXPECT_EQ(bench.engine->accounting(TaskId(2)), (sched::Accounting{1, 1, 0, 0, 0}));
-  EXPECT_EQ(bench.engine->accounting(TaskId(0)).in_flight(), 1U);
-  EXPECT_EQ(bench.engine->accounting(TaskId(1)).in_flight(), 1U);
+  EXPECT_EQ(bench.engine->figures(TaskId(2)).jobs, (sched::Accounting{1, 1, 0, 0, 0}));
+  EXPECT_EQ(bench.engine->figures(TaskId(0)).jobs.in_flight(), 1U);
+  EXPECT_EQ(bench.engine->figures(TaskId(1)).jobs.in_flight(), 1U);
 }
 
 TEST_P(EngineInEveryMode, ExceptionsAbortTheJobAndNothingElse) {
@@ -198,13 +198,13 @@ TEST_P(EngineInEveryMode, ExceptionsAbortTheJobAndNothingElse) {
   };
   bench.start();
   bench.release({0, 1});
-  while (bench.engine->accounting(TaskId(1)).aborted == 0) std::this_thread::yield();
-  while (bench.engine->accounting(TaskId(0)).finished == 0) std::this_thread::yield();
+  while (bench.engine->figures(TaskId(1)).jobs.aborted == 0) std::this_thread::yield();
+  while (bench.engine->figures(TaskId(0)).jobs.finished == 0) std::this_thread::yield();
   bench.release({0});
   done.wait();
   bench.finish();
   EXPECT_EQ(bench.exceptions, 1);
-  EXPECT_EQ(bench.engine->accounting(TaskId(1)), (sched::Accounting{1, 0, 0, 1, 0}));
+  EXPECT_EQ(bench.engine->figures(TaskId(1)).jobs, (sched::Accounting{1, 0, 0, 1, 0}));
 }
 
 TEST_P(EngineInEveryMode, ReleasesFromSeveralThreadsAndBodiesLoseNoJob) {
@@ -232,7 +232,7 @@ TEST_P(EngineInEveryMode, ReleasesFromSeveralThreadsAndBodiesLoseNoJob) {
     bench.finish();
     std::uint64_t ended = 0;
     for (std::size_t t = 0; t < kTasks; ++t) {
-      const sched::Accounting a = bench.engine->accounting(TaskId(t));
+      const sched::Accounting a = bench.engine->figures(TaskId(t)).jobs;
       EXPECT_LE(a.in_flight(), 1U);
       ended += a.finished + a.aborted;
     }
@@ -346,7 +346,7 @@ TEST_P(EngineInEveryMode, PausedItStartsNothingAndKeepsWhatIsReleased) {
   EXPECT_TRUE(bench.engine->wait_paused(kNever));
   EXPECT_EQ(bench.log(), "+2 -2");
   bench.engine->resume();
-  while (bench.engine->accounting(TaskId(0)).finished == 0) std::this_thread::yield();
+  while (bench.engine->figures(TaskId(0)).jobs.finished == 0) std::this_thread::yield();
   bench.engine->pause();
   EXPECT_TRUE(bench.engine->wait_paused(kNever));
   bench.release({0});
@@ -383,8 +383,8 @@ TEST_P(EngineInEveryMode, RunOneNeedsNoThreads) {
   EXPECT_EQ(bench.exceptions, 1);
   bench.engine->miss(TaskId(0), 0, Reason::Overrun);
   bench.finish();
-  EXPECT_EQ(bench.engine->accounting(TaskId(0)), (sched::Accounting{2, 1, 1, 0, 0}));
-  EXPECT_EQ(bench.engine->accounting(TaskId(2)), (sched::Accounting{.released = 1, .aborted = 1, .no_data = 1}));
+  EXPECT_EQ(bench.engine->figures(TaskId(0)).jobs, (sched::Accounting{2, 1, 1, 0, 0}));
+  EXPECT_EQ(bench.engine->figures(TaskId(2)).jobs, (sched::Accounting{.released = 1, .aborted = 1, .no_data = 1}));
   const auto starts = std::count_if(bench.events.begin(), bench.events.end(),
                                     [](const JobEvent &e) { return e.kind == JobEventKind::Started; });
   EXPECT_EQ(starts, 3);
@@ -399,8 +399,8 @@ TEST_P(EngineInEveryMode, TasksComeAndGoWhileItRuns) {
   options.config.reuse_ids = true;
   options.band = band;
   options.trace_capacity = 1 << 18;
-  options.start_paused = true;
   Engine engine(std::make_unique<sched::PriorityScheduler>(Workload{}, options.config), options);
+  engine.pause();
   const DagId dag = engine.add_dag(Dag{}, {}).dag;
   std::atomic<int> in_progress{0};
   std::atomic<int> most{0};
@@ -422,7 +422,7 @@ TEST_P(EngineInEveryMode, TasksComeAndGoWhileItRuns) {
   std::thread source([&] {
     while (!stop) engine.release(steady, engine.now());
   });
-  while (engine.accounting(steady).finished == 0) std::this_thread::yield();
+  while (engine.figures(steady).jobs.finished == 0) std::this_thread::yield();
   std::thread stepper([&] {
     while (!stop) {
       engine.pause();
@@ -454,7 +454,7 @@ TEST_P(EngineInEveryMode, TasksComeAndGoWhileItRuns) {
   engine.halt();
   EXPECT_TRUE(engine.wait_idle(kNever));
   EXPECT_LE(most, 2);
-  EXPECT_GT(engine.accounting(steady).finished, 0U);
+  EXPECT_GT(engine.figures(steady).jobs.finished, 0U);
 }
 
 TEST(Engine, NestedJobsRunOnOneThreadAndTheirTimeIsNotChargedToTheJobBelow) {
@@ -494,8 +494,8 @@ TEST(Engine, NestedJobsRunOnOneThreadAndTheirTimeIsNotChargedToTheJobBelow) {
   bench.finish();
   // The second job of 2 runs on top of 1 when the first has ended, before 1 is resumed.
   EXPECT_EQ(bench.log(), "+0 +1 +2 -2 +2 -2 -1 -0");
-  EXPECT_GE(bench.engine->usage(TaskId(2)).longest, 10 * kMillisecond);
-  EXPECT_LT(bench.engine->usage(TaskId(1)).longest, 10 * kMillisecond);
+  EXPECT_GE(bench.engine->figures(TaskId(2)).usage.longest, 10 * kMillisecond);
+  EXPECT_LT(bench.engine->figures(TaskId(1)).usage.longest, 10 * kMillisecond);
 }
 
 TEST(Engine, ABudgetEndsTheJobAtItsNextPreemptionPoint) {
@@ -513,11 +513,11 @@ TEST(Engine, ABudgetEndsTheJobAtItsNextPreemptionPoint) {
   };
   bench.start();
   bench.release({0});
-  while (bench.engine->accounting(TaskId(0)).aborted == 0) std::this_thread::yield();
+  while (bench.engine->figures(TaskId(0)).jobs.aborted == 0) std::this_thread::yield();
   bench.finish();
   EXPECT_FALSE(caught);
   EXPECT_EQ(bench.exceptions, 0);
-  EXPECT_EQ(bench.engine->usage(TaskId(0)).over_budget, 1U);
+  EXPECT_EQ(bench.engine->figures(TaskId(0)).usage.over_budget, 1U);
 }
 
 void use_processor(Duration time, bool with_points) {
@@ -537,11 +537,11 @@ TEST(Engine, ABudgetThatWasUsedIsToldAtTheEndAtTheLatest) {
   };
   bench.start();
   bench.release({0});
-  while (bench.engine->accounting(TaskId(0)).finished == 0) std::this_thread::yield();
+  while (bench.engine->figures(TaskId(0)).jobs.finished == 0) std::this_thread::yield();
   bench.release({0});
-  EXPECT_EQ(bench.engine->accounting(TaskId(0)).skipped, 1U);
+  EXPECT_EQ(bench.engine->figures(TaskId(0)).jobs.skipped, 1U);
   bench.release({0});
-  while (bench.engine->accounting(TaskId(0)).finished == 1) std::this_thread::yield();
+  while (bench.engine->figures(TaskId(0)).jobs.finished == 1) std::this_thread::yield();
   bench.finish();
   EXPECT_EQ(std::count_if(bench.events.begin(), bench.events.end(),
                           [](const JobEvent &event) { return event.kind == JobEventKind::Exceeded; }),
@@ -552,7 +552,7 @@ struct SkipLog final : SkipListener {
   explicit SkipLog(Engine &its_engine) : engine(its_engine) {}
   void skipped(Reason reason) noexcept override {
     reasons.push_back(reason);
-    (void)engine.usage(TaskId(0));  // takes the engine's lock
+    (void)engine.figures(TaskId(0)).usage;  // takes the engine's lock
   }
   Engine &engine;
   std::vector<Reason> reasons;
@@ -581,7 +581,7 @@ TEST(Engine, AListenerIsToldOfSkippedJobsAndNotOfMissedReleases) {
   EXPECT_TRUE(bench.engine->run_one());
   bench.engine->release(added, 4);
   EXPECT_EQ(log->reasons, (std::vector{Reason::Overrun, Reason::Budget}));
-  EXPECT_EQ(bench.engine->accounting(added).skipped, 3U);
+  EXPECT_EQ(bench.engine->figures(added).jobs.skipped, 3U);
 }
 
 TEST(Engine, HighModeIsOnWhileTheJobThatBeganItRuns) {
@@ -602,11 +602,11 @@ TEST(Engine, HighModeIsOnWhileTheJobThatBeganItRuns) {
   bench.release({0});
   begun.wait();
   bench.release({1});
-  EXPECT_EQ(bench.engine->accounting(TaskId(1)).skipped, 1U);
+  EXPECT_EQ(bench.engine->figures(TaskId(1)).jobs.skipped, 1U);
   released.set();
-  while (bench.engine->accounting(TaskId(0)).finished == 0) std::this_thread::yield();
+  while (bench.engine->figures(TaskId(0)).jobs.finished == 0) std::this_thread::yield();
   bench.release({1});
-  while (bench.engine->accounting(TaskId(1)).finished == 0) std::this_thread::yield();
+  while (bench.engine->figures(TaskId(1)).jobs.finished == 0) std::this_thread::yield();
   bench.finish();
 }
 

@@ -85,12 +85,12 @@ const Dispatch *JobPlacement::serve(Taker &taker, const sched::Step &step, const
   const bool is_caller = &self == &pool_.caller();
   taker.next.kind = Next::Kind::Nothing;
   const Dispatch *own = choose_own(step, taker.below);
-  const bool is_free = !taker.below.valid() && !is_caller;
-  if (is_free && own != nullptr && mailboxes_.should_leave(tasks[own->task], situation.waited)) {
+  const bool can_choose = is_free(taker);
+  if (can_choose && own != nullptr && mailboxes_.should_leave(tasks[own->task], situation.waited)) {
     add_idle(self, situation.may_lead);
     return nullptr;
   }
-  if (is_free) {
+  if (can_choose) {
     // In `os` mode a thread steals only if it would be idle: two threads that exchange jobs must exchange priorities.
     const std::uint32_t above = own == nullptr ? sched::kNoLimit : (os_ ? 0 : own->level);
     if (WorkerThread *other = mailboxes_.steal(above)) {
@@ -106,7 +106,7 @@ const Dispatch *JobPlacement::serve(Taker &taker, const sched::Step &step, const
   taker.next.kind = Next::Kind::Start;
   assign(self, *own, entry, taker.next.assignment);
   if (!is_caller) set_priority_for_job(self, taker.next.assignment);
-  if (is_free) mailboxes_.begin(self, entry);
+  if (can_choose) mailboxes_.begin(self, entry);
   return own;
 }
 

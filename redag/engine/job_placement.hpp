@@ -64,11 +64,11 @@ class JobPlacement {
   /// is for the usual case: one job starts, and the thread begins it. `waited`: it waited for the engine's lock.
   /// Returns false in all other cases, in which end() and place() are to be called.
   bool hand_over(Taker &taker, const sched::Step &step, TaskTable &tasks, bool waited) {
-    if (step.dispatches.size() != 1 || taker.below.valid() || &taker.thread == &pool_.caller()) return false;
+    if (step.dispatches.size() != 1 || !is_free(taker)) return false;
     const sched::Dispatch &next = step.dispatches.front();
+    if (next.kind != sched::DispatchKind::Start) return false;
     // With `os` a thread that has a job of its own steals none, but silent mail has to wake its thread.
-    const bool has_mail = os_ ? mailboxes_.any_silent() : !mailboxes_.all_empty();
-    if (next.kind != sched::DispatchKind::Start || has_mail) return false;
+    if (os_ ? mailboxes_.any_silent() : !mailboxes_.all_empty()) return false;
     WorkerThread &self = taker.thread;
     TaskEntry &entry = tasks[next.task];
     mailboxes_.end(self);
@@ -120,6 +120,10 @@ class JobPlacement {
   [[nodiscard]] int priority_of_level(std::uint32_t level) const { return band_.of_level(level); }
 
  private:
+  /// Returns true if the thread can have any job next: none is suspended on it, and it is one of the pool's.
+  [[nodiscard]] bool is_free(const Taker &taker) const {
+    return !taker.below.valid() && &taker.thread != &pool_.caller();
+  }
   /// Returns true if the job needs a thread: it starts, or it has waited and goes on.
   [[nodiscard]] bool needs_thread(const sched::Dispatch &dispatch) const {
     if (dispatch.kind == sched::DispatchKind::Start) return true;

@@ -73,7 +73,6 @@ Executor::Impl::Impl(ExecutorOptions options) : options_(std::move(options)) {
   engine.spins = spins_before_sleep(setup_, options_.spin.count());
   if (options_.lock_memory) engine.touched_stack = kTouchedStack;
   engine.on_exception = [this](const Job &job, std::exception_ptr e) { on_exception(job, std::move(e)); };
-  engine.devices = options_.devices;
   engine.waits_priority = setup_.timer_priority();
   Workload empty;
   empty.platform.devices = options_.devices;
@@ -222,7 +221,7 @@ void Executor::Impl::stop() {
 }
 
 bool Executor::Impl::is_own_thread() const {
-  return engine_->in_body() || engine_->in_service() || (misses_ && misses_->is_this_thread()) ||
+  return engine_->current_job() != nullptr || engine_->in_service() || (misses_ && misses_->is_this_thread()) ||
          (watchdog_ && watchdog_->is_this_thread());
 }
 

@@ -42,15 +42,14 @@ void add_threads(live::Sample &sample, const Engine &engine, std::span<const Tas
 void add_devices(live::Sample &sample, const Engine &engine) {
   std::vector<DeviceFigures> devices;
   engine.figures(devices);
-  for (std::size_t d = 0; d < devices.size(); ++d) {
-    const Device &device = engine.options().devices[d];
+  for (const DeviceFigures &device : devices) {
     live::DeviceSample &added = sample.devices.emplace_back();
-    added.name = device.name;
-    added.slots = device.slots;
-    added.queued = devices[d].queued;
-    added.served = devices[d].served;
-    added.busy = devices[d].busy;
-    for (const TaskId task : devices[d].serves) added.serves.push_back(task.value);
+    added.name = device.device.name;
+    added.slots = device.device.slots;
+    added.queued = device.queued;
+    added.served = device.served;
+    added.busy = device.busy;
+    for (const TaskId task : device.serves) added.serves.push_back(task.value);
   }
 }
 

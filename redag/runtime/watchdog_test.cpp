@@ -99,7 +99,7 @@ TEST(Watchdog, NamesAJobThatDoesNotEndOnceAndOnlyWhenItIsLate) {
   EXPECT_EQ(named[0].job.number, 0U);
   EXPECT_GT(named[0].elapsed, kForever);
   EXPECT_THAT(describe(named[0]), HasSubstr("it waits")) << "it has used no processor time";
-  EXPECT_EQ(watched.engine->usage(TaskId(0)).overdue, 1U);
+  EXPECT_EQ(watched.engine->figures(TaskId(0)).usage.overdue, 1U);
 }
 
 TEST(Watchdog, TheLimitCanBeAMultipleOfTheDeadline) {

@@ -90,6 +90,7 @@ class Lifecycle final : public Scheduler {
   void set_timing(TaskId task, Duration period, Duration deadline, Time now) override;
   void close(Time now) override;
   [[nodiscard]] std::span<const TaskId> tasks_of(DagId dag) const override { return table_.dags[dag.value].tasks; }
+  [[nodiscard]] std::span<const Device> devices() const override { return table_.devices; }
   [[nodiscard]] std::size_t task_slots() const override { return table_.tasks.size(); }
   [[nodiscard]] std::size_t dag_slots() const override { return table_.dags.size(); }
   [[nodiscard]] Accounting accounting(TaskId task) const override {

@@ -73,7 +73,7 @@ class PriorityDispatcher {
       return true;
     }
   };
-  struct Worker {
+  struct alignas(16) Worker {
     std::uint32_t running = kNil;  // the executing job; kNil while the worker is free or waits for a decision
     std::uint32_t stack = kNil;    // Cooperative: the topmost started job, running or suspended
     bool open = false;  // Cooperative: a nested job ended or a preemption point was reached, and a decision is due

@@ -175,6 +175,8 @@ class Scheduler {
   /// The DAG's tasks, first those it was added with, in its order. Includes removed tasks until their ids are used
   /// again. Valid until the next reconfiguration.
   [[nodiscard]] virtual std::span<const TaskId> tasks_of(DagId dag) const = 0;
+  /// The devices with which it was built, by DeviceId.
+  [[nodiscard]] virtual std::span<const Device> devices() const { return {}; }
   /// Ids in use are smaller than these numbers.
   [[nodiscard]] virtual std::size_t task_slots() const = 0;
   [[nodiscard]] virtual std::size_t dag_slots() const = 0;

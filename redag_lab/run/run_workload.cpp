@@ -158,7 +158,6 @@ class Run {
     engine.measure = options_.live;
     engine.spins = spins;
     if (options_.lock_memory) engine.touched_stack = runtime::kTouchedStack;
-    engine.devices = part.workload.platform.devices;
     engine.waits_priority = setup->timer_priority();
     if (kind != nullptr) engine.config = executors::effective_config(*kind, engine.config);
     auto scheduler = options_.scheduler ? options_.scheduler(part.workload, engine.config)
@@ -408,7 +407,7 @@ class Run {
     warn();
     cut();
     for (std::size_t t = 0; t < workload_.task_count(); ++t) {
-      result_.usage.push_back(engine_of(TaskId(t)).usage(local(TaskId(t))));
+      result_.usage.push_back(engine_of(TaskId(t)).figures(local(TaskId(t))).usage);
     }
   }
 

@@ -132,7 +132,8 @@ TEST_P(EngineProtocol, JoinWaitsForWhatHasStarted) {
     machine.engine->join();
     machine.quiet.begin();
     explored::check(machine.engine->started().empty(), "its threads have ended, and a job has not");
-    explored::check(machine.engine->accounting(TaskId(0)).finished == machine.ran(0), "a job that ran is not counted");
+    explored::check(machine.engine->figures(TaskId(0)).jobs.finished == machine.ran(0),
+                    "a job that ran is not counted");
   });
 }
 

@@ -147,7 +147,6 @@ class Machine {
       options.config.levels = 8;
       options.band = runtime::PriorityBand{8, 9};
     }
-    options.start_paused = platform.start_paused;
     options.trace_capacity = platform.trace_capacity;
     options.spins = platform.spins;
     options.spare_threads = platform.spare_threads;
@@ -158,6 +157,7 @@ class Machine {
       bodies.emplace_back([this, t](const Job &job) { return run(t, job); });
     }
     engine->bind(workload, std::move(bodies));
+    if (platform.start_paused) engine->pause();
   }
 
   void start() { explored::check(engine->start().has_value(), "the engine does not start"); }
@@ -194,7 +194,7 @@ class Machine {
     explored::check(engine->started().empty(), "idle, and a job has started and not ended");
     engine->join();
     for (std::size_t t = 0; t < works_.size(); ++t) {
-      const sched::Accounting jobs = engine->accounting(TaskId(t));
+      const sched::Accounting jobs = engine->figures(TaskId(t)).jobs;
       explored::check(jobs.finished + jobs.aborted == ran_[t].size(),
                       "not every job that ended has run, or vice versa");
       explored::check(jobs.in_flight() <= 1, "more than one job of a task waits");

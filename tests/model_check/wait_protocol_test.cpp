@@ -66,7 +66,7 @@ TEST_P(WaitProtocol, AnEventThatIsSetMeanwhileEndsTheWait) {
     explored::calm(true);
     machine.engine->halt();
     machine.engine->join();
-    explored::check(machine.engine->accounting(TaskId(0)).finished == 1, "the job did not end");
+    explored::check(machine.engine->figures(TaskId(0)).jobs.finished == 1, "the job did not end");
   });
 }
 

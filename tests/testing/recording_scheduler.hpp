@@ -64,6 +64,7 @@ class RecordingScheduler final : public sched::Scheduler {
   void set_timing(TaskId task, Duration period, Duration deadline, Time now) override;
   void close(Time now) override;
   [[nodiscard]] std::span<const TaskId> tasks_of(DagId dag) const override { return scheduler_->tasks_of(dag); }
+  [[nodiscard]] std::span<const Device> devices() const override { return scheduler_->devices(); }
   [[nodiscard]] std::size_t task_slots() const override { return scheduler_->task_slots(); }
   [[nodiscard]] std::size_t dag_slots() const override { return scheduler_->dag_slots(); }
   [[nodiscard]] sched::Accounting accounting(TaskId task) const override { return scheduler_->accounting(task); }

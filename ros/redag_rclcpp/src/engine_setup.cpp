@@ -55,14 +55,13 @@ std::unique_ptr<redag::runtime::Engine> make_engine(
   engine_options.trace_capacity = options.trace_capacity;
   engine_options.measure = options.live;
   engine_options.waits_priority = setup.timer_priority();
-  engine_options.start_paused = true;
   engine_options.on_exception = std::move(on_exception);
-  engine_options.devices = options.devices;
   redag::Workload empty;
   empty.platform.devices = options.devices;
   auto scheduler = std::make_unique<redag::sched::PriorityScheduler>(empty, engine_options.config);
   auto engine = std::make_unique<redag::runtime::Engine>(std::move(scheduler), std::move(engine_options));
   engine->set_origin(origin);
+  engine->pause();
   return engine;
 }
 

@@ -114,10 +114,10 @@ TEST(ReleaseTimer, AnIdleThreadReleasesOnlyWhileItRuns) {
   task.period = task.deadline = redag::kSecond;
   redag::runtime::EngineOptions options;
   options.config.workers = 1;
-  options.start_paused = true;
   redag::runtime::Engine engine(std::make_unique<redag::sched::PriorityScheduler>(workload, options.config), options);
   std::vector<redag::runtime::Body> bodies(1,
                                            [](const redag::runtime::Job &) { return redag::sched::Outcome::Finished; });
+  engine.pause();
   engine.bind(workload, std::move(bodies));
   engine.set_origin(redag::runtime::monotonic_now() - redag::kSecond);
   ReleaseTimer timer(engine, kOrigin);
@@ -125,12 +125,12 @@ TEST(ReleaseTimer, AnIdleThreadReleasesOnlyWhileItRuns) {
   fake.again = 3600 * redag::kSecond;
   timer.queue().schedule(fake, 1);
   EXPECT_EQ(timer.thread().release_due(), kNever);
-  EXPECT_EQ(engine.accounting(TaskId(0)).released, 0u);
+  EXPECT_EQ(engine.figures(TaskId(0)).jobs.released, 0u);
   timer.resume();
   EXPECT_EQ(timer.thread().release_due(), kOrigin + fake.again);
-  EXPECT_EQ(engine.accounting(TaskId(0)).released, 1u);
+  EXPECT_EQ(engine.figures(TaskId(0)).jobs.released, 1u);
   EXPECT_EQ(timer.thread().release_due(), kOrigin + fake.again);
-  EXPECT_EQ(engine.accounting(TaskId(0)).released, 1u);
+  EXPECT_EQ(engine.figures(TaskId(0)).jobs.released, 1u);
   fake.again = kNever;
   timer.queue().schedule(fake, kNever);
   EXPECT_EQ(timer.thread().release_due(), kNever);
