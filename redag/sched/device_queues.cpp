@@ -28,9 +28,7 @@ void DeviceQueues::serve() {
 void DeviceQueues::join(std::uint32_t slot) { add(of(slot), slot); }
 
 void DeviceQueues::leave(std::uint32_t slot) {
-  const Job &job = table_.jobs[slot];
-  if (job.parked_at == kNil) return;  // it waits without a device
-  if (job.state == JobState::Queued) return remove(of(slot), slot);
+  if (table_.jobs[slot].state == JobState::Queued) return remove(of(slot), slot);
   --of(slot).used;
 }
 

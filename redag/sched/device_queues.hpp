@@ -26,7 +26,7 @@ class DeviceQueues {
 
   /// The job is Queued from now on.
   void join(std::uint32_t slot);
-  /// The job, which is Queued or Away, leaves the queue or its slot.
+  /// The job, which is Queued or Away at a device, leaves the queue or its slot.
   void leave(std::uint32_t slot);
   /// The job's key changes between these two calls. It may be in any state.
   void begin_rekey(std::uint32_t slot);

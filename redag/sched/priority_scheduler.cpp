@@ -374,8 +374,10 @@ void PriorityDispatcher::on_wait(std::uint32_t slot, DeviceId device) {
 }
 
 void PriorityDispatcher::leave_device(std::uint32_t slot) {
+  const Job &job = table_.jobs[slot];
+  if (job.parked_at == kNil) return;  // it waits without a device
+  if (job.state == JobState::Away) unsettled_ = true;
   devices_.leave(slot);
-  unsettled_ = true;
 }
 
 void PriorityDispatcher::on_wake(std::uint32_t slot) {
