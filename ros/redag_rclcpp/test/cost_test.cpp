@@ -36,6 +36,8 @@ class CostTest : public ModeTest {
  protected:
   static constexpr int kWarm = 100;
   static constexpr int kCount = 1000;
+  // After a callback in which its thread lost the processor, the next ones are measured exactly.
+  static constexpr int kNowAndThen = kCount / 20;
 
   static Cost now(const redag::testing::SystemCalls &calls) {
     return {calls.count(), clock_readings.processor, clock_readings.monotonic};
@@ -84,20 +86,20 @@ TEST_P(CostTest, AShortCallbackMakesNoSystemCall) {
   redag::testing::SystemCalls calls;
   const Cost cost = measure(calls, true);
   if (!calls.why().empty()) GTEST_SKIP() << "system calls CANNOT BE COUNTED here: " << calls.why();
-  EXPECT_LE(cost.calls, kCount / 100) << calls.list();
+  EXPECT_LE(cost.calls, kNowAndThen) << calls.list();
 }
 
 TEST_P(CostTest, AShortCallbackAsksForNoProcessorTime) {
   redag::testing::SystemCalls calls;
   const Cost cost = measure(calls, false);
-  EXPECT_LE(cost.asked, kCount / 100);
+  EXPECT_LE(cost.asked, kNowAndThen);
 }
 
 // One reading of the clock when the message arrives, and one when the callback ends.
 TEST_P(CostTest, AShortCallbackReadsTheClockTwice) {
   redag::testing::SystemCalls calls;
   const Cost cost = measure(calls, false);
-  EXPECT_LE(cost.clocks, 2u * kCount + kCount / 100);
+  EXPECT_LE(cost.clocks, 2u * kCount + kNowAndThen);
 }
 
 }  // namespace
