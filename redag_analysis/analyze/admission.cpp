@@ -41,9 +41,9 @@ Result<void> admit_by_bounds(const Workload &workload, const sched::Config &conf
   }
   const Result<TaskSet> task_set = compile(workload, platform_of(config));
   if (!task_set) return tl::unexpected<Diagnostics>(task_set.error());
-  if (!task_set->not_analysable.empty() && !task_set->has_modes) return make_error(task_set->not_analysable);
   const Report report = analyze(*task_set);
   if (report.verdict == Verdict::Schedulable) return {};
+  if (!task_set->not_analysable.empty() && !task_set->has_modes) return make_error(task_set->not_analysable);
   const std::string doubtful = doubtful_tasks(*task_set, workload, report);
   return make_error("no bound shows that every deadline is met" + (doubtful.empty() ? "" : ": " + doubtful),
                     "'redag analyze --explain TASK' shows what a bound consists of");

@@ -9,11 +9,24 @@
 namespace redag::analysis {
 namespace {
 
+// A bound of all jobs goes before one of those that end.
+bool is_better(const ResponseBound &found, const Tightest &best) {
+  if (!found.response || !best.response) return found.response.has_value();
+  if (found.of_ended != best.bound.of_ended) return best.bound.of_ended;
+  return *found.response < *best.response;
+}
+
 void keep_tightest(std::vector<Tightest> &best, const std::vector<ResponseBound> &found, const Method &method) {
   for (std::size_t i = 0; i < found.size() && i < best.size(); ++i) {
-    if (!found[i].response || (best[i].response && *best[i].response <= *found[i].response)) continue;
-    best[i] = Tightest{found[i].response, &method, found[i], nullptr};
+    if (is_better(found[i], best[i])) best[i] = Tightest{found[i].response, &method, found[i], nullptr};
   }
+}
+
+bool lacks_bounds(const TaskSet &task_set, const std::vector<Tightest> &tasks, const std::vector<Tightest> &dags) {
+  for (std::size_t d = 0; d < dags.size(); ++d) {
+    if (task_set.dags[d].deadline > 0 && !dags[d].response) return true;
+  }
+  return std::any_of(tasks.begin(), tasks.end(), [](const Tightest &task) { return !task.response; });
 }
 
 Outcome apply_within(const TaskSet &task_set, const Method &method, const Effort::Limits &limits) {
@@ -30,7 +43,8 @@ MethodReport run(const TaskSet &task_set, const Method &method, const Effort::Li
   MethodReport report;
   report.method = &method;
   const bool is_covered = task_set.not_analysable.empty() || (task_set.has_modes && method.knows_modes) ||
-                          (task_set.has_waits && method.knows_waits);
+                          (task_set.has_waits && method.knows_waits) ||
+                          (method.knows_all && !task_set.is_beyond_numbers);
   report.outcome = is_covered ? apply_within(task_set, method, limits) : NotApplicable{task_set.not_analysable};
   if (const Bound *bound = report.bound()) {
     report.verdict = verdict(task_set, *bound);
@@ -51,12 +65,11 @@ void bound_alone(const TaskSet &task_set, const std::vector<Method> &methods, co
     if (std::none_of(parts.back().tasks.begin(), parts.back().tasks.end(), lacks_bound)) break;
     const auto part = std::make_shared<const MostUrgent>(std::move(parts.back()));
     for (const Method &method : methods) {
-      if (method.subject == Subject::TaskSet || method.is_paper()) continue;
+      if (method.subject == Subject::TaskSet || method.is_paper() || method.knows_all) continue;
       const MethodReport found = run(part->task_set, method, limits);
       if (!found.trusted) continue;
       const auto keep = [&](Tightest &best, const ResponseBound &bound) {
-        if (!bound.response || (best.response && *best.response <= *bound.response)) return;
-        best = Tightest{bound.response, &method, in_whole(*part, bound), part};
+        if (is_better(bound, best)) best = Tightest{bound.response, &method, in_whole(*part, bound), part};
       };
       const Bound &bound = *found.bound();
       for (std::size_t i = 0; i < bound.tasks.size(); ++i) keep(report.tasks[part->tasks[i]], bound.tasks[i]);
@@ -87,27 +100,36 @@ Report report_of(const TaskSet &task_set, const std::vector<Method> &methods, co
   Report report;
   report.tasks.resize(task_set.tasks.size());
   report.dags.resize(task_set.dags.size());
-  for (const Method &method : methods) {
+  const auto apply = [&](const Method &method, std::size_t index) {
     Effort::Limits limits;
     limits.steps = options.effort;
     limits.itemised.which = options.itemise ? Itemised::Which::All : Itemised::Which::None;
     if (options.stop) {
       limits.stop = [&](const EffortAt &at) {
-        return options.stop(AnalysisProgress{method, report.methods.size(), methods.size(), at});
+        return options.stop(AnalysisProgress{method, index, methods.size(), at});
       };
     }
-    report.methods.push_back(run(task_set, method, limits));
-    const MethodReport &last = report.methods.back();
-    if (!last.trusted) continue;
-    keep_tightest(report.tasks, last.bound()->tasks, method);
-    keep_tightest(report.dags, last.bound()->dags, method);
-    if (last.bound()->accepts == true) report.by.push_back(&method);
+    MethodReport found = run(task_set, method, limits);
+    if (!found.trusted) return found;
+    keep_tightest(report.tasks, found.bound()->tasks, method);
+    keep_tightest(report.dags, found.bound()->dags, method);
+    if (found.bound()->accepts == true) report.by.push_back(&method);
+    return found;
+  };
+  for (const Method &method : methods) {
+    MethodReport later{&method, NotApplicable{"other methods bound all tasks"}};
+    report.methods.push_back(method.knows_all ? std::move(later) : apply(method, report.methods.size()));
   }
 
   Effort::Limits limits;
   limits.steps = options.effort;
   limits.itemised.which = options.itemise ? Itemised::Which::All : Itemised::Which::None;
   bound_alone(task_set, methods, limits, report);
+  for (std::size_t i = 0; i < methods.size(); ++i) {
+    if (methods[i].knows_all && lacks_bounds(task_set, report.tasks, report.dags)) {
+      report.methods[i] = apply(methods[i], i);
+    }
+  }
 
   if (verdict(task_set, combine(report.tasks, report.dags)) == Verdict::Schedulable) {
     for (const Tightest &best : report.tasks) {
@@ -154,18 +176,20 @@ ResponseBound itemised(const TaskSet &task_set, const Tightest &tightest, DagId 
 Bound tightest_of(const Report &report) { return combine(report.tasks, report.dags); }
 
 bool is_shown_schedulable(const TaskSet &task_set) {
-  if (!task_set.not_analysable.empty() && !task_set.has_waits) return false;
   Effort::Limits limits;
   limits.steps = kUsualEffort;
   limits.itemised.which = Itemised::Which::None;
   std::vector<Tightest> tasks(task_set.tasks.size());
   std::vector<Tightest> dags(task_set.dags.size());
-  for (const Method &method : methods()) {
-    const MethodReport report = run(task_set, method, limits);
-    if (!report.trusted) continue;
-    if (report.verdict == Verdict::Schedulable) return true;
-    keep_tightest(tasks, report.bound()->tasks, method);
-    keep_tightest(dags, report.bound()->dags, method);
+  for (const bool last : {false, true}) {
+    for (const Method &method : methods()) {
+      if (method.knows_all != last || (last && !lacks_bounds(task_set, tasks, dags))) continue;
+      const MethodReport report = run(task_set, method, limits);
+      if (!report.trusted) continue;
+      if (report.verdict == Verdict::Schedulable) return true;
+      keep_tightest(tasks, report.bound()->tasks, method);
+      keep_tightest(dags, report.bound()->dags, method);
+    }
   }
   return verdict(task_set, combine(tasks, dags)) == Verdict::Schedulable;
 }

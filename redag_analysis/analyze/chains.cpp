@@ -36,7 +36,8 @@ const ResponseBound *bound_of(const TaskSet &task_set, TaskId task, const Bound 
   const bool states_hop = task.value < bound.tasks.size() && bound.tasks[task.value].hop;
   const std::vector<ResponseBound> &responses = single || states_hop ? bound.tasks : bound.dags;
   const std::uint32_t position = single || states_hop ? task.value : compiled.dag.value;
-  return position < responses.size() && responses[position].response ? &responses[position] : nullptr;
+  const bool is_known = position < responses.size() && responses[position].response && !responses[position].of_ended;
+  return is_known ? &responses[position] : nullptr;
 }
 
 // True if a job of `from` that is released no later than one of `to` always ends before that one starts. It must be

@@ -3,6 +3,7 @@
 
 // The registry: one line a method, in the order of a report.
 #include "redag_analysis/core/bound.hpp"
+#include "redag_analysis/many_workers/by_demand.hpp"
 #include "redag_analysis/many_workers/dag_isolated.hpp"
 #include "redag_analysis/many_workers/dag_shapes.hpp"
 #include "redag_analysis/many_workers/global_dag.hpp"
@@ -45,6 +46,8 @@ const std::vector<Method> &methods() {
       // Several workers, edf
       edf_global_response(),
       edf_global_density(),
+      // All features
+      by_demand(),
       // The equations of the paper
       paper_rm_bound(),
       paper_interference(),

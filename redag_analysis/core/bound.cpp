@@ -40,7 +40,7 @@ const char *to_string(Term::Kind kind) {
 }
 
 bool meets_deadline(const CompiledTask &task, const ResponseBound &bound) {
-  return bound.response && *bound.response <= std::min(task.deadline, task.limit);
+  return bound.response && !bound.of_ended && *bound.response <= std::min(task.deadline, task.limit);
 }
 
 Verdict verdict(const TaskSet &task_set, const Bound &bound) {

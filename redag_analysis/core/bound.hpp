@@ -45,6 +45,8 @@ struct ResponseBound {
   std::optional<Duration> response;  // empty: no bound, see `absent`
   std::string_view absent;           // why there is no bound: a sentence without a period
   std::vector<Term> terms;
+  /// The bound is that of jobs that end: others can be skipped or cut off, whatever their deadline.
+  bool of_ended = false;
   /// The longest time from readiness (the release as seen) to the finish. Only a method that finds more than `response`
   /// less jitter sets it.
   Duration from_ready = 0;
@@ -96,6 +98,7 @@ struct Method {
   std::string_view sound_only_if{};  // what the paper's own equations need to be sound; empty: nothing more
   bool knows_modes = false;          // it applies where there is a HI mode (TaskSet::has_modes)
   bool knows_waits = false;          // it covers tasks that wait (TaskSet::has_waits)
+  bool knows_all = false;            // it covers all features, and is applied where other methods leave tasks unbounded
   std::function<Outcome(const TaskSet &task_set)> apply{};
 
   [[nodiscard]] bool is_paper() const { return !sound_only_if.empty(); }

@@ -57,7 +57,16 @@ class Compiler {
     check_sums();
     check_threads();
     separate_modes();
-    if (lost_.per_second >= kSecond) refuse("stalls, releases and preemptions leave no processor time");
+    if (!modes_.empty()) {
+      for (CompiledTask &task : task_set_.tasks) {
+        if (task_set_.dags[task.dag.value].high) continue;
+        task.can_sink = task.can_lose = true;
+      }
+    }
+    if (lost_.per_second >= kSecond) {
+      refuse("stalls, releases and preemptions leave no processor time");
+      task_set_.is_beyond_numbers = true;
+    }
     task_set_.has_modes = task_set_.not_analysable.empty() && !modes_.empty() && waits_.empty();
     if (!modes_.empty()) refuse(std::move(modes_));
     refuse_waits(task_set_);
@@ -121,7 +130,9 @@ class Compiler {
   void check_sums() {
     Int128 sum = 0;
     for (const CompiledTask &task : task_set_.tasks) sum += Int128{task.wcet} + task.jitter;
-    if (sum > kLongestSum) refuse("execution times and jitter add up to more than 18 years");
+    if (sum <= kLongestSum) return;
+    refuse("execution times and jitter add up to more than 18 years");
+    task_set_.is_beyond_numbers = true;
   }
 
   // A started job keeps its thread while it is preempted.
@@ -159,6 +170,7 @@ class Compiler {
       for (std::uint32_t t = first; t < task_set_.tasks.size(); ++t) {
         refuse(task_set_.tasks[t],
                "DAG '" + dag.name + "': max_pending can cause jobs to be skipped although every deadline is met");
+        task_set_.tasks[t].can_lose = true;
       }
     }
     task_set_.dags.push_back(std::move(compiled));
@@ -222,10 +234,13 @@ class Compiler {
       // Preemption points are at multiples of the region, strictly inside the job.
       compiled.last_region = whole ? add(task.wcet, lead) : (task.wcet - 1) % task.region + 1;
     }
+    compiled.at_once = task.concurrency;
     if (task.concurrency > 1) {
       refuse(compiled, "task '" + compiled.name + "': jobs of a task with concurrency above 1 can overlap");
     }
     if (task.budget > 0 && task.budget < task.wcet && task.on_budget != OnBudget::Log) {
+      compiled.can_sink = task.on_budget == OnBudget::Demote;
+      compiled.can_lose = !compiled.can_sink;
       refuse(compiled, "task '" + compiled.name + "': its budget is below its wcet, so jobs can be " +
                            (task.on_budget == OnBudget::Abort    ? "cut off"
                             : task.on_budget == OnBudget::Demote ? "demoted"

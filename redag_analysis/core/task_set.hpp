@@ -101,6 +101,9 @@ struct CompiledTask {
   std::uint32_t level = 0;         // tasks of one level do not preempt each other
   std::uint32_t group = kNoGroup;  // only groups that two or more tasks share
   bool data = false;               // released by its predecessors' completion
+  std::uint32_t at_once = 1;       // the most of its jobs that are started and unfinished
+  bool can_sink = false;           // a job of it can be demoted below all others
+  bool can_lose = false;           // a job of it can be skipped or cut off although it would end in time
   std::uint32_t clock = 0;         // what its grid counts from; see is_released_with()
   std::string refusal;             // why no bound covers it; empty: nothing speaks against it
   bool has_gaps = false;           // its grid is that of events: the points are T apart, or any time more
@@ -162,6 +165,8 @@ struct TaskSet {
   std::string not_analysable;
   /// not_analysable is a reason for all tasks, not CompiledTask::refusal of some, nor waits.
   bool is_refused_whole = false;
+  /// Times are too long for sums, or no processor time is left: no method applies at all.
+  bool is_beyond_numbers = false;
   /// There are fewer threads than tasks, but enough if every response is within its period (jobs_in_progress.hpp).
   bool threads_suffice_if_bounded = false;
   /// Some wcet_low is below its wcet: there is a HI mode, and not_analysable has no other reason. Methods that know

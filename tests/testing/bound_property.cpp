@@ -205,7 +205,7 @@ class Judge {
       const analysis::CompiledTask &task = task_set_.tasks[t];
       if (!bound_.tasks[t].response) continue;
       result_.jobs += observed.finished[t];
-      if (observed.lost[t] > 0 && *bound_.tasks[t].response <= task.limit) {
+      if (observed.lost[t] > 0 && !bound_.tasks[t].of_ended && *bound_.tasks[t].response <= task.limit) {
         broken += fmt::format("{}: bounded by {}, and {} of its jobs were skipped\n", task.name,
                               *bound_.tasks[t].response, observed.lost[t]);
       }

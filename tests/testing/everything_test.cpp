@@ -56,7 +56,8 @@ Claims claims_of(const RandomRun &run, const analysis::AnalysisPlatform &platfor
     for (std::size_t t = 0; t < report.tasks.size(); ++t) {
       const std::size_t whole = one.part.tasks[t].value;
       claims.tasks[whole] = report.tasks[t].response;
-      claims.lose_nothing[whole] = claims.tasks[whole] && *claims.tasks[whole] <= one.analysed.task_set.tasks[t].limit;
+      claims.lose_nothing[whole] = claims.tasks[whole] && !report.tasks[t].bound.of_ended &&
+                                   *claims.tasks[whole] <= one.analysed.task_set.tasks[t].limit;
     }
     for (std::size_t d = 0; d < report.dags.size(); ++d) {
       claims.dags[one.part.dags[d].value] = report.dags[d].response;

@@ -1,0 +1,517 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+#include "redag_analysis/many_workers/by_demand.hpp"
+
+#include <algorithm>
+#include <numeric>
+#include <utility>
+
+#include "redag/sched/policy.hpp"
+#include "redag_analysis/core/arithmetic.hpp"
+#include "redag_analysis/core/effort.hpp"
+#include "redag_analysis/many_workers/fixed_point.hpp"
+
+namespace redag::analysis {
+namespace {
+
+constexpr std::string_view kDemandExceeds = "the demand of all that can go first exceeds the workers";
+constexpr int kMostQueued = 10'000;  // jobs of a task in one busy period
+
+// At most (window + jitter) / period + more events in any closed window.
+struct JobCount {
+  Duration period = 1;
+  Duration jitter = 0;
+  Duration more = 0;
+
+  [[nodiscard]] Duration in(Duration window) const { return add(add(window, jitter) / period, more); }
+  // The earliest window that can contain this many.
+  [[nodiscard]] Duration earliest(Duration number) const {
+    return std::max<Duration>(0, saturate(Int128{number - more} * period - jitter));
+  }
+};
+
+bool is_rarer(const JobCount &a, const JobCount &b) {
+  if (a.period != b.period) return a.period > b.period;
+  return a.in(a.period) < b.in(b.period);
+}
+
+class DemandBounds {
+ public:
+  explicit DemandBounds(const TaskSet &task_set)
+      : task_set_(task_set),
+        released_(task_set.tasks.size()),
+        since_(task_set.tasks.size()),
+        bounds_(task_set.tasks.size()) {
+    std::vector<bool> known(task_set.tasks.size(), false);
+    for (std::uint32_t t = 0; t < task_set.tasks.size(); ++t) count_releases(t, known);
+    std::uint64_t at_once = 0;
+    for (const CompiledTask &task : task_set.tasks) at_once += task.at_once;
+    const std::uint32_t threads = task_set.platform.max_started;
+    few_threads_ = task_set.mode == sched::Preemption::Full && threads > 0 && threads < at_once;
+    has_order_ = is_static(task_set.policy);
+  }
+
+  Bound run() {
+    // What is found of the more urgent tasks makes the others' bounds smaller.
+    for (const int sweep : {0, 1}) {
+      bool changed = false;
+      for (const std::uint32_t t : task_set_.by_rank) {
+        const std::optional<Duration> before = since_[t];
+        bound(t);
+        changed = changed || since_[t] != before;
+      }
+      if (sweep == 0 && (!changed || task_set_.platform.workers == 1)) break;
+    }
+    return assemble();
+  }
+
+ private:
+  // What can delay a job of the task.
+  struct Rivals {
+    std::vector<bool> first;     // by TaskId: its jobs can go first
+    std::vector<bool> lifted;    // less urgent holders of groups of those
+    std::vector<bool> held_for;  // those for which the task can wait while workers are idle: the rest of its group
+    std::vector<bool> fills;     // the rest of its DAG, if a max_active can bind
+    std::vector<bool> waits;     // those whose waits at devices can delay it
+    bool all = false;
+    Duration blocking = 0;  // the longest stretches of the others, one on each worker
+    std::uint32_t divisor = 1;
+  };
+
+  [[nodiscard]] const CompiledTask &task(std::uint32_t t) const { return task_set_.tasks[t]; }
+  [[nodiscard]] Duration executes(std::uint32_t t) const { return task(t).wcet - task(t).waits; }
+  // Its waits, without the time in queues.
+  [[nodiscard]] Duration away(std::uint32_t t) const {
+    Duration sum = task(t).elsewhere;
+    for (const DeviceUse &use : task(t).devices) sum = add(sum, use.service);
+    return sum;
+  }
+  [[nodiscard]] bool uses(std::uint32_t t, std::size_t device) const {
+    return device < task(t).devices.size() && task(t).devices[device].requests > 0;
+  }
+  [[nodiscard]] bool waits_for_data(std::uint32_t t) const { return !task(t).data && !task(t).predecessors.empty(); }
+  [[nodiscard]] std::uint32_t place(std::uint32_t t) const {
+    return task_set_.mode == sched::Preemption::Full ? task(t).level : task(t).tier;
+  }
+  [[nodiscard]] bool is_capped(std::uint32_t t) const { return task_set_.dags[task(t).dag.value].max_active > 0; }
+
+  // ---- how many jobs there are ----
+
+  // Jobs that have started, that are ready, and one that waits for data.
+  [[nodiscard]] Duration unfinished(std::uint32_t t) const {
+    const Duration queued = std::max<Duration>(1, task(t).limit / task(t).period);
+    return task(t).at_once + queued + (waits_for_data(t) ? 1 : 0);
+  }
+
+  // A data task has no more releases than a predecessor has ends, and one for an end that came before.
+  void count_releases(std::uint32_t t, std::vector<bool> &known) {
+    if (known[t]) return;
+    known[t] = true;
+    released_[t] = JobCount{task(t).period, task(t).jitter, 1};
+    if (!task(t).data) return;
+    std::optional<JobCount> least;
+    for (const std::uint32_t p : task(t).predecessors) {
+      count_releases(p, known);
+      JobCount ends = released_[p];
+      ends.more = add(ends.more, unfinished(p) + (task(t).predecessors.size() > 1 ? 1 : 0));
+      if (!least || is_rarer(ends, *least)) least = ends;
+    }
+    if (least) released_[t] = *least;
+  }
+
+  // The most jobs of the task that are unfinished at some instant of the window.
+  [[nodiscard]] Duration active(std::uint32_t t, Duration window) const {
+    const Duration all = add(released_[t].in(window), unfinished(t));
+    if (!since_[t]) return all;
+    // A timer's job becomes ready before its next release is seen.
+    const Duration since = add(*since_[t], waits_for_data(t) ? add(task(t).period, task(t).jitter) : 0);
+    return std::min(all, released_[t].in(add(window, since)));
+  }
+
+  // ---- who can go first ----
+
+  [[nodiscard]] Rivals rivals_of(std::uint32_t t) const {
+    const std::size_t count = task_set_.tasks.size();
+    Rivals rivals;
+    rivals.held_for.assign(count, false);
+    rivals.fills.assign(count, false);
+    rivals.lifted.assign(count, false);
+    rivals.all = !has_order_ || few_threads_ || task(t).can_sink;
+    std::uint32_t last = place(t);
+    if (task(t).group != kNoGroup) {
+      for (const std::uint32_t other : task_set_.groups[task(t).group]) {
+        rivals.held_for[other] = other != t;
+        // The holder has the urgency of those that wait, but for one that keeps its worker.
+        if (task_set_.mode != sched::Preemption::Full) last = std::max(last, place(other));
+      }
+    }
+    if (is_capped(t)) {
+      for (const std::uint32_t other : task_set_.dags[task(t).dag.value].tasks) {
+        rivals.fills[other] = other != t;
+        rivals.all = rivals.all || task(other).can_sink;
+        last = std::max(last, place(other));
+      }
+    }
+    close(last, rivals);
+    return rivals;
+  }
+
+  // All tasks down to this place. Groups lift their holders above it.
+  void close(std::uint32_t last, Rivals &rivals) const {
+    const std::size_t count = task_set_.tasks.size();
+    rivals.first.assign(count, rivals.all);
+    Effort::spend(count);
+    for (std::uint32_t other = 0; other < count && !rivals.all; ++other) rivals.first[other] = place(other) <= last;
+    for (const std::vector<std::uint32_t> &group : task_set_.groups) {
+      const bool lifts = std::any_of(group.begin(), group.end(), [&](std::uint32_t o) { return rivals.first[o]; });
+      for (const std::uint32_t o : group) rivals.lifted[o] = lifts && !rivals.first[o];
+    }
+    if (task_set_.mode == sched::Preemption::Full) return;
+    std::vector<Duration> stretches;
+    for (std::uint32_t other = 0; other < count; ++other) {
+      // A demoted job keeps its worker, too.
+      if (rivals.first[other] && !(task(other).can_sink && !rivals.all)) continue;
+      const Duration one = std::min(task(other).region, executes(other)) - 1;
+      for (std::uint32_t i = 0; i < task(other).at_once && one > 0; ++i) stretches.push_back(one);
+    }
+    std::sort(stretches.begin(), stretches.end(), std::greater<>());
+    stretches.resize(std::min<std::size_t>(stretches.size(), task_set_.platform.workers));
+    for (const Duration one : stretches) rivals.blocking = add(rivals.blocking, one);
+  }
+
+  void bound(std::uint32_t t) {
+    if (auto window = window_of(t)) take(t, *window);
+    if (task_set_.platform.workers == 1) {
+      if (auto window = busy_period_of(t)) take(t, *window);
+    }
+  }
+
+  void take(std::uint32_t t, Duration window) {
+    if (!since_[t] || window < since_[t]) since_[t] = window;
+  }
+
+  // ---- any number of workers ----
+
+  // One window, from the readiness of a job to its end.
+  struct Window {
+    Duration own = 0;      // the job itself, and earlier ones of its task
+    Duration apart = 0;    // while a worker can be idle
+    Duration workers = 0;  // while all workers are busy
+  };
+
+  // The longest time from the release of a job as seen, or from its readiness, to its end.
+  std::optional<Duration> window_of(std::uint32_t t) {
+    Rivals rivals = rivals_of(t);
+    rivals.divisor = task_set_.platform.workers;
+    if (task_set_.mode == sched::Preemption::Cooperative) {
+      // A job can lie under others on its worker while further workers are idle.
+      const auto can_lie = [this](std::uint32_t o) { return task(o).region < executes(o) || task(o).wake_ups > 0; };
+      bool lies = can_lie(t);
+      for (std::uint32_t o = 0; o < task_set_.tasks.size(); ++o) {
+        lies = lies || ((rivals.held_for[o] || rivals.fills[o]) && can_lie(o));
+      }
+      if (lies) rivals.divisor = 1;
+    }
+    const bool is_plain = !task(t).data && task(t).predecessors.empty();
+    const Duration queued = std::max<Duration>(1, task(t).limit / task(t).period);
+    for (const Duration earlier : {Duration{0}, task(t).at_once + queued - 1}) {
+      if (earlier == 0 && (!is_plain || task(t).at_once > 1)) continue;
+      Duration x = 1;
+      const bool found = global::least_fixed_point(stop_of(t), x, [&](Duration window) {
+        const Window parts = evaluate(t, rivals, earlier, window);
+        return add(parts.own, add(parts.apart, parts.workers));
+      });
+      // Without earlier jobs, the response has to end before the next release.
+      if (found && (earlier > 0 || add(x, task(t).jitter) <= task(t).period)) return x;
+    }
+    return std::nullopt;
+  }
+
+  [[nodiscard]] Duration stop_of(std::uint32_t t) const {
+    Duration longest = task(t).period;
+    for (const CompiledTask &other : task_set_.tasks) longest = std::max(longest, other.period);
+    return multiply(longest, 64);
+  }
+
+  [[nodiscard]] Window evaluate(std::uint32_t t, const Rivals &rivals, Duration earlier, Duration x) const {
+    const std::size_t count = task_set_.tasks.size();
+    Effort::spend(count);
+    Window window;
+    const Duration whole = add(executes(t), away(t));
+    window.own = multiply(whole, earlier + 1);
+    Duration in_dag = 0;
+    Duration epochs = add(1 + task(t).wake_ups, multiply(earlier, 1 + task(t).wake_ups));
+    Int128 works = Int128{earlier} * executes(t);
+    std::vector<std::pair<Duration, Duration>> rest;  // work, width
+    rest.emplace_back(saturate(works), task(t).at_once);
+    for (std::uint32_t o = 0; o < count; ++o) {
+      if (o == t) continue;
+      const bool is_beside = rivals.held_for[o] || rivals.fills[o];
+      if (!rivals.first[o] && !rivals.lifted[o] && !is_beside && !few_threads_) continue;
+      const Duration jobs = active(o, x);
+      const Duration work = multiply(jobs, executes(o));
+      const Duration with_waits = add(work, multiply(jobs, away(o)));
+      if (rivals.held_for[o]) {
+        window.apart = add(window.apart, with_waits);
+      } else if (rivals.fills[o]) {
+        in_dag = add(in_dag, with_waits);
+      } else if (few_threads_) {
+        window.apart = add(window.apart, multiply(jobs, away(o)));
+      }
+      if (is_beside) epochs = add(epochs, multiply(jobs, 1 + task(o).wake_ups));
+      if (rivals.first[o] || rivals.lifted[o]) rest.emplace_back(work, task(o).at_once);
+    }
+    if (in_dag > 0) window.apart = add(window.apart, in_dag / task_set_.dags[task(t).dag.value].max_active);
+    for (std::size_t d = 0; d < task_set_.devices.size(); ++d) {
+      window.apart = add(window.apart, queue_at(t, d, rivals, earlier, x));
+    }
+    if (rivals.blocking > 0) rest.emplace_back(multiply(rivals.blocking, epochs), rivals.divisor);
+    window.workers = share(rest, rivals.divisor);
+    return window;
+  }
+
+  // While a job is in the queue of a device, all its slots serve others.
+  [[nodiscard]] Duration queue_at(std::uint32_t t, std::size_t device, const Rivals &rivals, Duration earlier,
+                                  Duration x) const {
+    bool is_asked = uses(t, device);
+    for (std::uint32_t o = 0; o < task_set_.tasks.size() && !is_asked; ++o) {
+      is_asked = uses(o, device) && (rivals.held_for[o] || rivals.fills[o] || few_threads_);
+    }
+    if (!is_asked) return 0;
+    Duration served = uses(t, device) ? multiply(earlier, task(t).devices[device].service) : 0;
+    for (std::uint32_t o = 0; o < task_set_.tasks.size(); ++o) {
+      if (o != t && uses(o, device)) served = add(served, multiply(active(o, x), task(o).devices[device].service));
+    }
+    return served / task_set_.devices[device].slots;
+  }
+
+  // The most instants y in which all workers execute this work: m y <= sum min(work, width y).
+  [[nodiscard]] static Duration share(const std::vector<std::pair<Duration, Duration>> &works, Duration workers) {
+    Duration most = kUnbounded;
+    for (int i = 0; i < 100; ++i) {
+      Int128 sum = 0;
+      for (const auto &[work, width] : works) sum += std::min(Int128{work}, Int128{width} * most);
+      const Duration next = saturate(sum / workers);
+      if (next >= most) break;
+      most = next;
+    }
+    return most;
+  }
+
+  // ---- one worker: the busy period of a level ----
+
+  // The level: what can go first, with all that its jobs can wait for, but for holders that it lifts.
+  [[nodiscard]] Rivals level_of(std::uint32_t t) const {
+    Rivals rivals;
+    rivals.lifted.assign(task_set_.tasks.size(), false);
+    rivals.all = !has_order_ || few_threads_ || task(t).can_sink;
+    std::uint32_t last = place(t);
+    const auto include = [&](const std::vector<std::uint32_t> &tasks) {
+      if (std::none_of(tasks.begin(), tasks.end(), [&](std::uint32_t o) { return place(o) <= last; })) return false;
+      const std::uint32_t before = last;
+      for (const std::uint32_t o : tasks) last = std::max(last, place(o));
+      return last != before;
+    };
+    for (bool changed = !rivals.all; changed;) {
+      changed = false;
+      for (const CompiledDag &dag : task_set_.dags) changed = (dag.max_active > 0 && include(dag.tasks)) || changed;
+      if (task_set_.mode == sched::Preemption::Full) continue;
+      for (const std::vector<std::uint32_t> &group : task_set_.groups) changed = include(group) || changed;
+    }
+    for (const CompiledDag &dag : task_set_.dags) {
+      if (dag.max_active == 0) continue;
+      const bool is_in = std::any_of(dag.tasks.begin(), dag.tasks.end(), [&](auto o) { return place(o) <= last; });
+      const bool sinks = std::any_of(dag.tasks.begin(), dag.tasks.end(), [&](auto o) { return task(o).can_sink; });
+      rivals.all = rivals.all || (is_in && sinks);
+    }
+    close(last, rivals);
+    return rivals;
+  }
+
+  // What becomes ready in a busy period of the level, in a closed window that begins with it.
+  [[nodiscard]] std::vector<JobCount> begun_in(const Rivals &level) const {
+    std::vector<JobCount> counts(task_set_.tasks.size());
+    std::vector<bool> known(counts.size(), false);
+    for (std::uint32_t t = 0; t < counts.size(); ++t) count_begun(t, level, counts, known);
+    return counts;
+  }
+
+  void count_begun(std::uint32_t t, const Rivals &level, std::vector<JobCount> &counts,
+                   std::vector<bool> &known) const {
+    if (known[t]) return;
+    known[t] = true;
+    counts[t] = released_[t];
+    const bool stays = level.first[t] && (level.all || !task(t).can_sink);
+    if (!stays) {
+      // Its jobs can have been unfinished before the period began.
+      counts[t].more = add(counts[t].more, unfinished(t));
+    } else if (waits_for_data(t)) {
+      counts[t].jitter = add(counts[t].jitter, task(t).period);
+    } else if (task(t).data) {
+      std::optional<JobCount> least;
+      for (const std::uint32_t p : task(t).predecessors) {
+        count_begun(p, level, counts, known);
+        JobCount ends = counts[p];
+        if (task(t).predecessors.size() > 1) ends.more = add(ends.more, 1);
+        if (!least || is_rarer(ends, *least)) least = ends;
+      }
+      if (least) counts[t] = *least;
+    }
+  }
+
+  std::optional<Duration> busy_period_of(std::uint32_t t) {
+    const Rivals level = level_of(t);
+    const std::vector<JobCount> counts = begun_in(level);
+    const std::size_t count = counts.size();
+    std::vector<Duration> costs(count, 0);
+    double load = 0;
+    for (std::uint32_t o = 0; o < count; ++o) {
+      if (!level.first[o] && !level.lifted[o]) continue;
+      costs[o] = add(add(executes(o), away(o)), multiply(level.blocking, task(o).wake_ups));
+      load += static_cast<double>(costs[o]) / static_cast<double>(counts[o].period);
+    }
+    if (load >= 1.0) return std::nullopt;
+    const auto demand = [&](Duration window, Duration own_jobs) {
+      Effort::spend(count);
+      Duration sum = level.blocking;
+      for (std::uint32_t o = 0; o < count; ++o) {
+        if (costs[o] == 0) continue;
+        const Duration jobs = o == t && own_jobs > 0 ? own_jobs : counts[o].in(window - 1);
+        sum = add(sum, multiply(jobs, costs[o]));
+      }
+      for (std::size_t d = 0; d < task_set_.devices.size(); ++d) sum = add(sum, served_before(level, d, window));
+      return sum;
+    };
+    const Duration stop = stop_of(t);
+    Duration length = 1;
+    if (!global::least_fixed_point(stop, length, [&](Duration window) { return demand(window, 0); })) {
+      return std::nullopt;
+    }
+    if (task(t).at_once > 1) return length;
+    const Duration jobs = counts[t].in(length - 1);
+    if (jobs > kMostQueued) return length;
+    Duration longest = 0;
+    Duration window = 1;
+    for (Duration q = 0; q < jobs; ++q) {
+      if (!global::least_fixed_point(stop, window, [&](Duration w) { return demand(w, q + 1); })) return length;
+      longest = std::max(longest, window - std::min(window, counts[t].earliest(q + 1)));
+    }
+    return longest;
+  }
+
+  // Service of others than the level's tasks for which its jobs can wait in the queue of a device.
+  [[nodiscard]] Duration served_before(const Rivals &level, std::size_t device, Duration window) const {
+    Duration served = 0;
+    bool is_asked = false;
+    for (std::uint32_t o = 0; o < task_set_.tasks.size(); ++o) {
+      if (!uses(o, device)) continue;
+      if (level.first[o] || level.lifted[o]) {
+        is_asked = true;
+      } else {
+        served = add(served, multiply(active(o, window), task(o).devices[device].service));
+      }
+    }
+    return is_asked ? served : 0;
+  }
+
+  // ---- the answer ----
+
+  Bound assemble() {
+    // From the grid point of the unit: a task ends no later, if every instance before has ended.
+    std::vector<std::optional<Duration>> from_grid(task_set_.tasks.size());
+    std::vector<bool> is_lossless(task_set_.units.size(), true);
+    for (std::uint32_t u = 0; u < task_set_.units.size(); ++u) {
+      const Unit &unit = task_set_.units[u];
+      is_lossless[u] = unit.awaits.empty();
+      for (const std::uint32_t t : unit.tasks) {
+        is_lossless[u] = is_lossless[u] && since_[t] && !task(t).can_lose;
+        if (!is_lossless[u]) break;
+        Duration ready = task(t).jitter;
+        for (const std::uint32_t p : task(t).predecessors) ready = std::max(ready, *from_grid[p]);
+        from_grid[t] = add(ready, *since_[t]);
+        is_lossless[u] = *from_grid[t] <= unit.limit;
+      }
+    }
+    for (std::uint32_t t = 0; t < task_set_.tasks.size(); ++t) {
+      ResponseBound &bound = bounds_[t];
+      if (!since_[t]) {
+        bound.absent = kDemandExceeds;
+        continue;
+      }
+      bound.of_ended = !is_lossless[task(t).unit];
+      const Duration late = task(t).data        ? task_set_.frozen
+                            : !bound.of_ended   ? *from_grid[t] - *since_[t]
+                            : waits_for_data(t) ? add(task(t).period, task(t).jitter)
+                                                : task(t).jitter;
+      bound.response = add(*since_[t], late);
+      if (Effort::itemises(task(t).unit)) bound.terms = terms_of(t, late);
+    }
+    Bound bound;
+    for (ResponseBound &one : bounds_) bound.tasks.push_back(if_bounded(std::move(one)));
+    for (const CompiledDag &dag : task_set_.dags) {
+      ResponseBound whole;
+      whole.response = 0;
+      for (const std::uint32_t t : dag.tasks) {
+        if (!whole.response || !is_lossless[task(t).unit]) {
+          whole.response.reset();
+          whole.absent = since_[t] ? "a job of it can be lost, and its data with it" : kDemandExceeds;
+        } else if (*from_grid[t] >= *whole.response) {
+          whole.response = *from_grid[t];
+          whole.terms = bound.tasks[t].terms;
+          const Duration before = *from_grid[t] - *bound.tasks[t].response;
+          if (before != 0 && !whole.terms.empty()) {
+            whole.terms.push_back(Term{Term::Kind::Wait, {}, task(t).dag, before, 0});
+          }
+        }
+      }
+      bound.dags.push_back(if_bounded(std::move(whole)));
+    }
+    return bound;
+  }
+
+  [[nodiscard]] std::vector<Term> terms_of(std::uint32_t t, Duration late) const {
+    const DagId dag = task(t).dag;
+    std::vector<Term> terms;
+    const Duration own = std::min(*since_[t], task(t).wcet - task(t).waits - task(t).overhead);
+    terms.push_back(Term{Term::Kind::Own, TaskId(t), dag, own, 1});
+    terms.push_back(Term{Term::Kind::Interference, {}, {}, *since_[t] - own, 0});
+    if (late > 0) terms.push_back(Term{waits_for_data(t) ? Term::Kind::Wait : Term::Kind::Jitter, {}, dag, late, 0});
+    return terms;
+  }
+
+  const TaskSet &task_set_;
+  bool has_order_ = false;
+  bool few_threads_ = false;
+  std::vector<JobCount> released_;              // by TaskId
+  std::vector<std::optional<Duration>> since_;  // by TaskId: from the release as seen, or from readiness, to the end
+  std::vector<ResponseBound> bounds_;
+};
+
+Outcome apply_by_demand(const TaskSet &task_set) {
+  if (!task_set.groups.empty() && task_set.platform.preempt_overhead > 0) {
+    return NotApplicable{"groups cannot be combined with an overhead of preemption"};
+  }
+  if (!task_set.groups.empty() && task_set.several_executors) {
+    return NotApplicable{"groups of several executors on one processor: a holder need not run for those that wait"};
+  }
+  return DemandBounds(task_set).run();
+}
+
+}  // namespace
+
+Method by_demand() {
+  return Method{
+      .name = "by_demand",
+      .subject = Subject::Task,
+      .cite = "docs/analysis.md, \"Any features\"",
+      .assumptions = "any workers, policy, preemption and features; groups without an overhead of preemption",
+      .complexity = "pseudo-polynomial; O(tasks) per step, for each task",
+      .knows_modes = true,
+      .knows_waits = true,
+      .knows_all = true,
+      .apply = apply_by_demand,
+  };
+}
+
+}  // namespace redag::analysis
