@@ -45,11 +45,10 @@ class DemandBounds {
         bounds_(task_set.tasks.size()) {
     std::vector<bool> known(task_set.tasks.size(), false);
     for (std::uint32_t t = 0; t < task_set.tasks.size(); ++t) count_releases(t, known);
-    std::uint64_t at_once = 0;
-    for (const CompiledTask &task : task_set.tasks) at_once += task.at_once;
     const std::uint32_t threads = task_set.platform.max_started;
-    few_threads_ = task_set.mode == sched::Preemption::Full && threads > 0 && threads < at_once;
+    few_threads_ = task_set.mode == sched::Preemption::Full && threads > 0 && threads < most_started();
     has_order_ = is_static(task_set.policy);
+    has_waits_ = std::any_of(task_set.tasks.begin(), task_set.tasks.end(), [](const auto &t) { return t.wake_ups > 0; });
   }
 
   Bound run() {
@@ -75,7 +74,10 @@ class DemandBounds {
     std::vector<bool> fills;     // the rest of its DAG, if a max_active can bind
     std::vector<bool> waits;     // those whose waits at devices can delay it
     bool all = false;
-    Duration blocking = 0;  // the longest stretches of the others, one on each worker
+    bool finds_one = false;  // of less urgent holders of its group, it waits for one
+    Duration cap = 0;          // the max_active of its DAG
+    bool fills_apart = false;  // while its DAG is full, workers can be idle
+    Duration blocking = 0;     // the longest stretches of the others, one on each worker
     std::uint32_t divisor = 1;
   };
 
@@ -97,6 +99,23 @@ class DemandBounds {
   [[nodiscard]] bool is_capped(std::uint32_t t) const { return task_set_.dags[task(t).dag.value].max_active > 0; }
 
   // ---- how many jobs there are ----
+
+  // The most jobs that are started and unfinished at once.
+  [[nodiscard]] std::uint64_t most_started() const {
+    std::uint64_t sum = 0;
+    for (const CompiledDag &dag : task_set_.dags) {
+      std::uint64_t most = 0;
+      std::vector<std::uint32_t> groups;
+      for (const std::uint32_t t : dag.tasks) {
+        const std::uint32_t group = task(t).group;
+        const bool is_counted = group != kNoGroup && std::find(groups.begin(), groups.end(), group) != groups.end();
+        if (group != kNoGroup) groups.push_back(group);
+        most += is_counted ? 0 : task(t).at_once;
+      }
+      sum += dag.max_active > 0 ? std::min<std::uint64_t>(most, dag.max_active) : most;
+    }
+    return sum;
+  }
 
   // Jobs that have started, that are ready, and one that waits for data.
   [[nodiscard]] Duration unfinished(std::uint32_t t) const {
@@ -142,8 +161,8 @@ class DemandBounds {
     if (task(t).group != kNoGroup) {
       for (const std::uint32_t other : task_set_.groups[task(t).group]) {
         rivals.held_for[other] = other != t;
-        // The holder has the urgency of those that wait, but for one that keeps its worker.
-        if (task_set_.mode != sched::Preemption::Full) last = std::max(last, place(other));
+        // The holder has the urgency of those that wait, but one that lies under others stays there.
+        if (task_set_.mode == sched::Preemption::Cooperative) last = std::max(last, place(other));
       }
     }
     if (is_capped(t)) {
@@ -153,6 +172,8 @@ class DemandBounds {
         last = std::max(last, place(other));
       }
     }
+    // Whoever is less urgent takes a group only if the task does not wait for it.
+    rivals.finds_one = !rivals.all && !is_capped(t);
     close(last, rivals);
     return rivals;
   }
@@ -213,6 +234,10 @@ class DemandBounds {
       }
       if (lies) rivals.divisor = 1;
     }
+    rivals.cap = task_set_.dags[task(t).dag.value].max_active;
+    for (std::uint32_t o = 0; o < task_set_.tasks.size(); ++o) {
+      if (rivals.fills[o]) rivals.fills_apart = rivals.fills_apart || rivals.cap < rivals.divisor || task(o).wake_ups > 0;
+    }
     const bool is_plain = !task(t).data && task(t).predecessors.empty();
     const Duration queued = std::max<Duration>(1, task(t).limit / task(t).period);
     for (const Duration earlier : {Duration{0}, task(t).at_once + queued - 1}) {
@@ -234,62 +259,98 @@ class DemandBounds {
     return multiply(longest, 64);
   }
 
+  // Each tick that others execute counts once: where it can delay the job the most.
   [[nodiscard]] Window evaluate(std::uint32_t t, const Rivals &rivals, Duration earlier, Duration x) const {
     const std::size_t count = task_set_.tasks.size();
     Effort::spend(count);
     Window window;
-    const Duration whole = add(executes(t), away(t));
-    window.own = multiply(whole, earlier + 1);
+    window.own = multiply(add(executes(t), away(t)), earlier + 1);
+    const Duration together = std::min<Duration>(rivals.cap, rivals.divisor);
     Duration in_dag = 0;
-    Duration epochs = add(1 + task(t).wake_ups, multiply(earlier, 1 + task(t).wake_ups));
-    Int128 works = Int128{earlier} * executes(t);
+    Duration epochs = multiply(1 + task(t).wake_ups, earlier + 1);
+    Duration holder = 0;
     std::vector<std::pair<Duration, Duration>> rest;  // work, width
-    rest.emplace_back(saturate(works), task(t).at_once);
     for (std::uint32_t o = 0; o < count; ++o) {
       if (o == t) continue;
       const bool is_beside = rivals.held_for[o] || rivals.fills[o];
-      if (!rivals.first[o] && !rivals.lifted[o] && !is_beside && !few_threads_) continue;
-      const Duration jobs = active(o, x);
-      const Duration work = multiply(jobs, executes(o));
-      const Duration with_waits = add(work, multiply(jobs, away(o)));
-      if (rivals.held_for[o]) {
-        window.apart = add(window.apart, with_waits);
-      } else if (rivals.fills[o]) {
-        in_dag = add(in_dag, with_waits);
-      } else if (few_threads_) {
-        window.apart = add(window.apart, multiply(jobs, away(o)));
+      if (!rivals.first[o] && !is_beside) continue;
+      if (rivals.held_for[o] && rivals.finds_one && place(o) > place(t)) {
+        holder = std::max(holder, multiply(add(executes(o), away(o)), earlier + 1));
+        epochs = add(epochs, multiply(1 + task(o).wake_ups, earlier + 1));
+        continue;
       }
+      const Duration jobs = active(o, x);
       if (is_beside) epochs = add(epochs, multiply(jobs, 1 + task(o).wake_ups));
-      if (rivals.first[o] || rivals.lifted[o]) rest.emplace_back(work, task(o).at_once);
+      const Duration waits = multiply(jobs, away(o));
+      const Duration work = multiply(jobs, executes(o));
+      if (rivals.held_for[o]) {
+        window.apart = add(window.apart, add(work, waits));
+      } else if (rivals.fills[o]) {
+        in_dag = add(in_dag, add(waits, rivals.fills_apart ? work : 0));
+      } else if (few_threads_) {
+        window.apart = add(window.apart, waits);
+      }
+      if (rivals.held_for[o] || (rivals.fills[o] && rivals.fills_apart)) continue;
+      rest.emplace_back(work, task(o).at_once);
     }
-    if (in_dag > 0) window.apart = add(window.apart, in_dag / task_set_.dags[task(t).dag.value].max_active);
+    window.apart = add(window.apart, holder);
+    if (in_dag > 0) window.apart = add(window.apart, in_dag / together);
+    for (const std::vector<std::uint32_t> &group : task_set_.groups) {
+      const Duration work = lifted_work(group, rivals, [&](std::uint32_t o) { return active(o, x); },
+                                        [&](std::uint32_t o) { return o == t ? 0 : executes(o); });
+      if (work > 0) rest.emplace_back(work, 1);
+    }
     for (std::size_t d = 0; d < task_set_.devices.size(); ++d) {
-      window.apart = add(window.apart, queue_at(t, d, rivals, earlier, x));
+      window.apart = add(window.apart, queue_at(t, d, rivals, x));
     }
     if (rivals.blocking > 0) rest.emplace_back(multiply(rivals.blocking, epochs), rivals.divisor);
-    window.workers = share(rest, rivals.divisor);
+    // Where jobs of the DAG count for less than an instant each, other workers can execute the rest in that instant.
+    window.workers = share(rest, rivals.divisor, rivals.fills_apart && together > 1);
     return window;
   }
 
+  // What less urgent holders of the group do with the urgency of others: all that they can, or one job for each job
+  // that waits for the group.
+  template <class Jobs, class Cost>
+  [[nodiscard]] Duration lifted_work(const std::vector<std::uint32_t> &group, const Rivals &rivals, Jobs jobs,
+                                     Cost cost) const {
+    Duration all = 0;
+    Duration longest = 0;
+    Duration waiters = 0;
+    bool is_capped_member = false;
+    for (const std::uint32_t o : group) {
+      if (rivals.first[o]) {
+        waiters = add(waiters, jobs(o));
+        is_capped_member = is_capped_member || is_capped(o);
+      } else if (rivals.lifted[o]) {
+        all = add(all, multiply(jobs(o), cost(o)));
+        longest = std::max(longest, cost(o));
+      }
+    }
+    return is_capped_member ? all : std::min(all, multiply(waiters, longest));
+  }
+
   // While a job is in the queue of a device, all its slots serve others.
-  [[nodiscard]] Duration queue_at(std::uint32_t t, std::size_t device, const Rivals &rivals, Duration earlier,
-                                  Duration x) const {
+  [[nodiscard]] Duration queue_at(std::uint32_t t, std::size_t device, const Rivals &rivals, Duration x) const {
+    const std::uint32_t slots = task_set_.devices[device].slots;
     bool is_asked = uses(t, device);
-    for (std::uint32_t o = 0; o < task_set_.tasks.size() && !is_asked; ++o) {
-      is_asked = uses(o, device) && (rivals.held_for[o] || rivals.fills[o] || few_threads_);
-    }
-    if (!is_asked) return 0;
-    Duration served = uses(t, device) ? multiply(earlier, task(t).devices[device].service) : 0;
+    Duration served = 0;
     for (std::uint32_t o = 0; o < task_set_.tasks.size(); ++o) {
-      if (o != t && uses(o, device)) served = add(served, multiply(active(o, x), task(o).devices[device].service));
+      if (o == t || !uses(o, device)) continue;
+      is_asked = is_asked || rivals.held_for[o] || rivals.fills[o] || few_threads_;
+      // What counts in full already does not count again.
+      if (rivals.held_for[o] || (rivals.fills[o] && rivals.cap <= slots) || (few_threads_ && !rivals.fills[o])) continue;
+      served = add(served, multiply(active(o, x), task(o).devices[device].service));
     }
-    return served / task_set_.devices[device].slots;
+    return is_asked ? served / slots : 0;
   }
 
   // The most instants y in which all workers execute this work: m y <= sum min(work, width y).
-  [[nodiscard]] static Duration share(const std::vector<std::pair<Duration, Duration>> &works, Duration workers) {
+  // `is_mixed`: the others can execute something else.
+  [[nodiscard]] static Duration share(const std::vector<std::pair<Duration, Duration>> &works, Duration workers,
+                                      bool is_mixed) {
     Duration most = kUnbounded;
-    for (int i = 0; i < 100; ++i) {
+    for (int i = 0; i < (is_mixed ? 1 : 100); ++i) {
       Int128 sum = 0;
       for (const auto &[work, width] : works) sum += std::min(Int128{work}, Int128{width} * most);
       const Duration next = saturate(sum / workers);
@@ -316,7 +377,7 @@ class DemandBounds {
     for (bool changed = !rivals.all; changed;) {
       changed = false;
       for (const CompiledDag &dag : task_set_.dags) changed = (dag.max_active > 0 && include(dag.tasks)) || changed;
-      if (task_set_.mode == sched::Preemption::Full) continue;
+      if (task_set_.mode != sched::Preemption::Cooperative) continue;
       for (const std::vector<std::uint32_t> &group : task_set_.groups) changed = include(group) || changed;
     }
     for (const CompiledDag &dag : task_set_.dags) {
@@ -367,18 +428,25 @@ class DemandBounds {
     std::vector<Duration> costs(count, 0);
     double load = 0;
     for (std::uint32_t o = 0; o < count; ++o) {
-      if (!level.first[o] && !level.lifted[o]) continue;
       costs[o] = add(add(executes(o), away(o)), multiply(level.blocking, task(o).wake_ups));
-      load += static_cast<double>(costs[o]) / static_cast<double>(counts[o].period);
+      if (level.first[o]) load += static_cast<double>(costs[o]) / static_cast<double>(counts[o].period);
     }
     if (load >= 1.0) return std::nullopt;
     const auto demand = [&](Duration window, Duration own_jobs) {
       Effort::spend(count);
       Duration sum = level.blocking;
       for (std::uint32_t o = 0; o < count; ++o) {
-        if (costs[o] == 0) continue;
+        if (!level.first[o]) continue;
         const Duration jobs = o == t && own_jobs > 0 ? own_jobs : counts[o].in(window - 1);
         sum = add(sum, multiply(jobs, costs[o]));
+      }
+      for (const std::vector<std::uint32_t> &group : task_set_.groups) {
+        // While no job waits, none that is less urgent starts in the period: it contains one holder.
+        const Duration most = has_waits_ ? kUnbounded : longest_lifted(group, level, costs);
+        const Duration work = lifted_work(
+            group, level, [&](std::uint32_t o) { return counts[o].in(window - 1); },
+            [&](std::uint32_t o) { return costs[o]; });
+        sum = add(sum, std::min(most, work));
       }
       for (std::size_t d = 0; d < task_set_.devices.size(); ++d) sum = add(sum, served_before(level, d, window));
       return sum;
@@ -397,6 +465,13 @@ class DemandBounds {
       if (!global::least_fixed_point(stop, window, [&](Duration w) { return demand(w, q + 1); })) return length;
       longest = std::max(longest, window - std::min(window, counts[t].earliest(q + 1)));
     }
+    return longest;
+  }
+
+  [[nodiscard]] static Duration longest_lifted(const std::vector<std::uint32_t> &group, const Rivals &level,
+                                               const std::vector<Duration> &costs) {
+    Duration longest = 0;
+    for (const std::uint32_t o : group) longest = std::max(longest, level.lifted[o] ? costs[o] - 1 : 0);
     return longest;
   }
 
@@ -483,6 +558,7 @@ class DemandBounds {
   const TaskSet &task_set_;
   bool has_order_ = false;
   bool few_threads_ = false;
+  bool has_waits_ = false;
   std::vector<JobCount> released_;              // by TaskId
   std::vector<std::optional<Duration>> since_;  // by TaskId: from the release as seen, or from readiness, to the end
   std::vector<ResponseBound> bounds_;
