@@ -10,6 +10,7 @@
 
 #include "redag/loader/workload_yaml.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
+#include "redag_analysis/many_workers/by_demand.hpp"
 #include "tests/testing/bound_property.hpp"
 #include "tests/testing/random_workloads.hpp"
 #include "tests/testing/repository.hpp"
@@ -67,6 +68,15 @@ TEST(BoundProperty, OfMixedFeatures) {
       const std::uint32_t count = preemption == Preemption::Full ? 600 : 150;
       testing::expect_bound_holds(whole_analysis(), mixed(workers, preemption),
                                   {.workloads = count, .include_refused = true});
+    }
+  }
+}
+
+TEST(BoundProperty, ByDemandOfMixedFeatures) {
+  using sched::Preemption;
+  for (const std::uint32_t workers : {1U, 3U}) {
+    for (const Preemption preemption : {Preemption::Full, Preemption::None, Preemption::Cooperative}) {
+      testing::expect_bound_holds(by_demand(), mixed(workers, preemption), {.workloads = 200, .include_refused = true});
     }
   }
 }

@@ -79,4 +79,10 @@ std::size_t most_jobs_in_progress(const TaskSet &task_set, DagId dag) {
   return most;
 }
 
+std::uint32_t most_side_by_side(const TaskSet &task_set, const std::vector<std::uint32_t> &tasks) {
+  constexpr std::size_t kMost = 64;
+  const std::size_t most = tasks.size() < 2 || tasks.size() > kMost ? tasks.size() : Antichain(task_set, tasks).size();
+  return static_cast<std::uint32_t>(most);
+}
+
 }  // namespace redag::analysis

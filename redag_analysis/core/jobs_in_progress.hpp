@@ -6,6 +6,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <vector>
 
 #include "redag_analysis/core/task_set.hpp"
 
@@ -16,5 +18,9 @@ namespace redag::analysis {
 /// without edges, responses above the period do no harm: jobs of a task still never overlap. O(tasks^3). Proof:
 /// docs/analysis.md, "Jobs in progress".
 [[nodiscard]] std::size_t most_jobs_in_progress(const TaskSet &task_set, DagId dag);
+
+/// The largest set of these tasks of which none follows another: so many can execute at once while no two instances
+/// overlap. Of more than 64 tasks it returns their number.
+[[nodiscard]] std::uint32_t most_side_by_side(const TaskSet &task_set, const std::vector<std::uint32_t> &tasks);
 
 }  // namespace redag::analysis

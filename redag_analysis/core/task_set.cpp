@@ -4,6 +4,7 @@
 #include "redag_analysis/core/task_set.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <numeric>
 #include <set>
@@ -61,6 +62,10 @@ class Compiler {
       for (CompiledTask &task : task_set_.tasks) {
         if (task_set_.dags[task.dag.value].high) continue;
         task.can_sink = task.can_lose = true;
+        // At most so many releases in HI mode are refused one after the other.
+        const Degrade &degrade = workload_.dags[task.dag.value].degrade;
+        const auto refused = std::max<Duration>(degrade.skip, static_cast<Duration>(std::ceil(degrade.stretch))) + 1;
+        task.replaced = add(task.replaced, multiply(task.period, refused));
       }
     }
     if (lost_.per_second >= kSecond) {
@@ -209,6 +214,11 @@ class Compiler {
         compiled.waits = add(compiled.waits, add(use.service, use.blocked));
       }
       compiled.wake_ups = static_cast<std::uint32_t>(task.waits.size());
+      for (std::size_t w = 0; w <= task.waits.size() && compiled.wake_ups > 0; ++w) {
+        const Duration end = w < task.waits.size() ? task.waits[w].after : task.wcet;
+        const Duration begin = w > 0 ? task.waits[w - 1].after : 0;
+        compiled.stretches.push_back(lengthened(add(end - begin, add(lead, platform.preempt_overhead))));
+      }
       compiled.wcet = add(compiled.wcet, compiled.waits);
     }
     compiled.wcet_low = task.wcet_low > 0 ? lengthened(add(task.wcet_low, overhead)) : compiled.wcet;
@@ -235,6 +245,9 @@ class Compiler {
       compiled.last_region = whole ? add(task.wcet, lead) : (task.wcet - 1) % task.region + 1;
     }
     compiled.at_once = task.concurrency;
+    // Each job that exceeds its budget can refuse one release.
+    const bool refuses = task.budget > 0 && task.budget < task.wcet && task.on_budget == OnBudget::SkipNext;
+    compiled.replaced = multiply(task.period, refuses ? Duration{1} + task.concurrency : 1);
     if (task.concurrency > 1) {
       refuse(compiled, "task '" + compiled.name + "': jobs of a task with concurrency above 1 can overlap");
     }

@@ -85,10 +85,11 @@ struct CompiledTask {
   Duration bcet = 0;      // with overheads, > 0; only explorations of tests read it: bounds hold for shorter executions
   Duration overhead = 0;  // the part of `wcet` that is overhead
   Duration waits = 0;     // the part of `wcet` in which the job needs no worker: all of `devices`, and `elsewhere`
-  std::vector<DeviceUse> devices;  // by DeviceId; empty if no task waits
-  Duration elsewhere = 0;          // waits without a device
-  std::uint32_t wake_ups = 0;      // the number of its waits
-  Duration period = 0;             // T, least distance of two nominal releases of the unit
+  std::vector<DeviceUse> devices;   // by DeviceId; empty if no task waits
+  Duration elsewhere = 0;           // waits without a device
+  std::uint32_t wake_ups = 0;       // the number of its waits
+  std::vector<Duration> stretches;  // execution before, between and after its waits; empty if it does not wait
+  Duration period = 0;              // T, least distance of two nominal releases of the unit
   Duration offset = 0;    // a timer's own; a data task's is that of its grid (see Unit). Bounds of units without rate
                           // edges hold for all offsets
   Duration deadline = 0;  // D, from the task's own release
@@ -102,6 +103,7 @@ struct CompiledTask {
   std::uint32_t group = kNoGroup;  // only groups that two or more tasks share
   bool data = false;               // released by its predecessors' completion
   std::uint32_t at_once = 1;       // the most of its jobs that are started and unfinished
+  Duration replaced = 0;           // from a release to the next one that is not itself refused, jitter aside
   bool can_sink = false;           // a job of it can be demoted below all others
   bool can_lose = false;           // a job of it can be skipped or cut off although it would end in time
   std::uint32_t clock = 0;         // what its grid counts from; see is_released_with()

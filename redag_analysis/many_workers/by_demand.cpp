@@ -48,7 +48,8 @@ class DemandBounds {
     const std::uint32_t threads = task_set.platform.max_started;
     few_threads_ = task_set.mode == sched::Preemption::Full && threads > 0 && threads < most_started();
     has_order_ = is_static(task_set.policy);
-    has_waits_ = std::any_of(task_set.tasks.begin(), task_set.tasks.end(), [](const auto &t) { return t.wake_ups > 0; });
+    has_waits_ =
+        std::any_of(task_set.tasks.begin(), task_set.tasks.end(), [](const auto &t) { return t.wake_ups > 0; });
   }
 
   Bound run() {
@@ -74,7 +75,7 @@ class DemandBounds {
     std::vector<bool> fills;     // the rest of its DAG, if a max_active can bind
     std::vector<bool> waits;     // those whose waits at devices can delay it
     bool all = false;
-    bool finds_one = false;  // of less urgent holders of its group, it waits for one
+    bool finds_one = false;    // of less urgent holders of its group, it waits for one
     Duration cap = 0;          // the max_active of its DAG
     bool fills_apart = false;  // while its DAG is full, workers can be idle
     Duration blocking = 0;     // the longest stretches of the others, one on each worker
@@ -93,6 +94,8 @@ class DemandBounds {
     return device < task(t).devices.size() && task(t).devices[device].requests > 0;
   }
   [[nodiscard]] bool waits_for_data(std::uint32_t t) const { return !task(t).data && !task(t).predecessors.empty(); }
+  // A timer's job becomes ready before its next release is seen, or is skipped.
+  [[nodiscard]] Duration until_ready(std::uint32_t t) const { return add(task(t).replaced, task(t).jitter); }
   [[nodiscard]] std::uint32_t place(std::uint32_t t) const {
     return task_set_.mode == sched::Preemption::Full ? task(t).level : task(t).tier;
   }
@@ -139,24 +142,26 @@ class DemandBounds {
     if (least) released_[t] = *least;
   }
 
-  // The most jobs of the task that are unfinished at some instant of the window.
+  // The most jobs of the task that execute or wait in the window. The last one is released before it ends, and the
+  // first one ends after it begins.
   [[nodiscard]] Duration active(std::uint32_t t, Duration window) const {
-    const Duration all = add(released_[t].in(window), unfinished(t));
+    const Duration all = add(released_[t].in(window - 1), unfinished(t));
     if (!since_[t]) return all;
-    // A timer's job becomes ready before its next release is seen.
-    const Duration since = add(*since_[t], waits_for_data(t) ? add(task(t).period, task(t).jitter) : 0);
-    return std::min(all, released_[t].in(add(window, since)));
+    const Duration since = add(*since_[t], waits_for_data(t) ? until_ready(t) : 0);
+    return std::min(all, released_[t].in(std::max<Duration>(0, add(window, since) - 2)));
   }
 
   // ---- who can go first ----
 
-  [[nodiscard]] Rivals rivals_of(std::uint32_t t) const {
+  // `all`: as if every task could go first.
+  [[nodiscard]] Rivals rivals_of(std::uint32_t t, bool all) const {
     const std::size_t count = task_set_.tasks.size();
     Rivals rivals;
     rivals.held_for.assign(count, false);
     rivals.fills.assign(count, false);
     rivals.lifted.assign(count, false);
-    rivals.all = !has_order_ || few_threads_ || task(t).can_sink;
+    const bool is_ordered = has_order_ && !few_threads_ && !task(t).can_sink;
+    rivals.all = all || !is_ordered;
     std::uint32_t last = place(t);
     if (task(t).group != kNoGroup) {
       for (const std::uint32_t other : task_set_.groups[task(t).group]) {
@@ -173,7 +178,7 @@ class DemandBounds {
       }
     }
     // Whoever is less urgent takes a group only if the task does not wait for it.
-    rivals.finds_one = !rivals.all && !is_capped(t);
+    rivals.finds_one = is_ordered && !is_capped(t);
     close(last, rivals);
     return rivals;
   }
@@ -202,9 +207,11 @@ class DemandBounds {
   }
 
   void bound(std::uint32_t t) {
-    if (auto window = window_of(t)) take(t, *window);
-    if (task_set_.platform.workers == 1) {
-      if (auto window = busy_period_of(t)) take(t, *window);
+    for (const bool all : {false, true}) {
+      if (all && since_[t]) return;
+      if (auto window = window_of(t, all)) take(t, *window);
+      if (task_set_.platform.workers > 1) continue;
+      if (auto window = busy_period_of(t, all)) take(t, *window);
     }
   }
 
@@ -214,16 +221,15 @@ class DemandBounds {
 
   // ---- any number of workers ----
 
-  // One window, from the readiness of a job to its end.
+  // The time of a window in which the job waits for others.
   struct Window {
-    Duration own = 0;      // the job itself, and earlier ones of its task
     Duration apart = 0;    // while a worker can be idle
     Duration workers = 0;  // while all workers are busy
   };
 
   // The longest time from the release of a job as seen, or from its readiness, to its end.
-  std::optional<Duration> window_of(std::uint32_t t) {
-    Rivals rivals = rivals_of(t);
+  std::optional<Duration> window_of(std::uint32_t t, bool all) {
+    Rivals rivals = rivals_of(t, all);
     rivals.divisor = task_set_.platform.workers;
     if (task_set_.mode == sched::Preemption::Cooperative) {
       // A job can lie under others on its worker while further workers are idle.
@@ -236,21 +242,49 @@ class DemandBounds {
     }
     rivals.cap = task_set_.dags[task(t).dag.value].max_active;
     for (std::uint32_t o = 0; o < task_set_.tasks.size(); ++o) {
-      if (rivals.fills[o]) rivals.fills_apart = rivals.fills_apart || rivals.cap < rivals.divisor || task(o).wake_ups > 0;
+      if (rivals.fills[o])
+        rivals.fills_apart = rivals.fills_apart || rivals.cap < rivals.divisor || task(o).wake_ups > 0;
     }
     const bool is_plain = !task(t).data && task(t).predecessors.empty();
     const Duration queued = std::max<Duration>(1, task(t).limit / task(t).period);
     for (const Duration earlier : {Duration{0}, task(t).at_once + queued - 1}) {
       if (earlier == 0 && (!is_plain || task(t).at_once > 1)) continue;
-      Duration x = 1;
-      const bool found = global::least_fixed_point(stop_of(t), x, [&](Duration window) {
-        const Window parts = evaluate(t, rivals, earlier, window);
-        return add(parts.own, add(parts.apart, parts.workers));
+      const Duration whole = add(executes(t), away(t));
+      const std::optional<Duration> one = fixed_point(t, [&](Duration x) {
+        const Window parts = evaluate(t, rivals, earlier, x);
+        return add(multiply(whole, earlier + 1), add(parts.apart, parts.workers));
       });
+      const std::optional<Duration> parts = earlier == 0 ? stretch_by_stretch(t, rivals) : std::nullopt;
+      const Duration least = std::min(one.value_or(kUnbounded), parts.value_or(kUnbounded));
       // Without earlier jobs, the response has to end before the next release.
-      if (found && (earlier > 0 || add(x, task(t).jitter) <= task(t).period)) return x;
+      if (least < kUnbounded && (earlier > 0 || add(least, task(t).jitter) <= task(t).period)) return least;
     }
     return std::nullopt;
+  }
+
+  template <class Next>
+  [[nodiscard]] std::optional<Duration> fixed_point(std::uint32_t t, Next next) const {
+    Duration x = 1;
+    return global::least_fixed_point(stop_of(t), x, next) ? std::optional(x) : std::nullopt;
+  }
+
+  // A window for each stretch of execution and each request to a device. Others delay it only in these.
+  [[nodiscard]] std::optional<Duration> stretch_by_stretch(std::uint32_t t, const Rivals &rivals) const {
+    if (task(t).wake_ups == 0 || task(t).group != kNoGroup || is_capped(t) || few_threads_) return std::nullopt;
+    Duration sum = task(t).elsewhere;
+    for (const Duration stretch : task(t).stretches) {
+      const auto found = fixed_point(t, [&](Duration x) { return add(stretch, evaluate(t, rivals, 0, x).workers); });
+      if (!found) return std::nullopt;
+      sum = add(sum, *found);
+    }
+    for (std::size_t d = 0; d < task_set_.devices.size(); ++d) {
+      if (!uses(t, d)) continue;
+      const DeviceUse &use = task(t).devices[d];
+      const auto found = fixed_point(t, [&](Duration x) { return add(use.longest, queue_at(t, d, rivals, x)); });
+      if (!found) return std::nullopt;
+      sum = add(sum, multiply(*found, use.requests));
+    }
+    return sum;
   }
 
   [[nodiscard]] Duration stop_of(std::uint32_t t) const {
@@ -264,7 +298,6 @@ class DemandBounds {
     const std::size_t count = task_set_.tasks.size();
     Effort::spend(count);
     Window window;
-    window.own = multiply(add(executes(t), away(t)), earlier + 1);
     const Duration together = std::min<Duration>(rivals.cap, rivals.divisor);
     Duration in_dag = 0;
     Duration epochs = multiply(1 + task(t).wake_ups, earlier + 1);
@@ -296,8 +329,9 @@ class DemandBounds {
     window.apart = add(window.apart, holder);
     if (in_dag > 0) window.apart = add(window.apart, in_dag / together);
     for (const std::vector<std::uint32_t> &group : task_set_.groups) {
-      const Duration work = lifted_work(group, rivals, [&](std::uint32_t o) { return active(o, x); },
-                                        [&](std::uint32_t o) { return o == t ? 0 : executes(o); });
+      const Duration work = lifted_work(
+          group, rivals, [&](std::uint32_t o) { return active(o, x); },
+          [&](std::uint32_t o) { return o == t ? 0 : executes(o); });
       if (work > 0) rest.emplace_back(work, 1);
     }
     for (std::size_t d = 0; d < task_set_.devices.size(); ++d) {
@@ -339,7 +373,8 @@ class DemandBounds {
       if (o == t || !uses(o, device)) continue;
       is_asked = is_asked || rivals.held_for[o] || rivals.fills[o] || few_threads_;
       // What counts in full already does not count again.
-      if (rivals.held_for[o] || (rivals.fills[o] && rivals.cap <= slots) || (few_threads_ && !rivals.fills[o])) continue;
+      if (rivals.held_for[o] || (rivals.fills[o] && rivals.cap <= slots) || (few_threads_ && !rivals.fills[o]))
+        continue;
       served = add(served, multiply(active(o, x), task(o).devices[device].service));
     }
     return is_asked ? served / slots : 0;
@@ -363,10 +398,10 @@ class DemandBounds {
   // ---- one worker: the busy period of a level ----
 
   // The level: what can go first, with all that its jobs can wait for, but for holders that it lifts.
-  [[nodiscard]] Rivals level_of(std::uint32_t t) const {
+  [[nodiscard]] Rivals level_of(std::uint32_t t, bool all) const {
     Rivals rivals;
     rivals.lifted.assign(task_set_.tasks.size(), false);
-    rivals.all = !has_order_ || few_threads_ || task(t).can_sink;
+    rivals.all = all || !has_order_ || few_threads_ || task(t).can_sink;
     std::uint32_t last = place(t);
     const auto include = [&](const std::vector<std::uint32_t> &tasks) {
       if (std::none_of(tasks.begin(), tasks.end(), [&](std::uint32_t o) { return place(o) <= last; })) return false;
@@ -408,7 +443,7 @@ class DemandBounds {
       // Its jobs can have been unfinished before the period began.
       counts[t].more = add(counts[t].more, unfinished(t));
     } else if (waits_for_data(t)) {
-      counts[t].jitter = add(counts[t].jitter, task(t).period);
+      counts[t].jitter = until_ready(t);
     } else if (task(t).data) {
       std::optional<JobCount> least;
       for (const std::uint32_t p : task(t).predecessors) {
@@ -421,8 +456,8 @@ class DemandBounds {
     }
   }
 
-  std::optional<Duration> busy_period_of(std::uint32_t t) {
-    const Rivals level = level_of(t);
+  std::optional<Duration> busy_period_of(std::uint32_t t, bool all) {
+    const Rivals level = level_of(t, all);
     const std::vector<JobCount> counts = begun_in(level);
     const std::size_t count = counts.size();
     std::vector<Duration> costs(count, 0);
@@ -517,7 +552,7 @@ class DemandBounds {
       bound.of_ended = !is_lossless[task(t).unit];
       const Duration late = task(t).data        ? task_set_.frozen
                             : !bound.of_ended   ? *from_grid[t] - *since_[t]
-                            : waits_for_data(t) ? add(task(t).period, task(t).jitter)
+                            : waits_for_data(t) ? until_ready(t)
                                                 : task(t).jitter;
       bound.response = add(*since_[t], late);
       if (Effort::itemises(task(t).unit)) bound.terms = terms_of(t, late);

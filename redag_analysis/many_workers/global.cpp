@@ -28,6 +28,11 @@ std::optional<std::string> why_not_mode(const TaskSet &task_set, const Needs &ne
              : "requires jobs that run to completion, but jobs can be preempted here";
 }
 
+// Instances of the unit overlap, and any of its tasks can execute beside any other.
+void let_overlap(GlobalUnit &unit, std::uint32_t workers) {
+  set_width(unit, std::min({workers, unit.tasks, unit.bound > 0 ? unit.bound : unit.tasks}));
+}
+
 // True if the max_active can bind while R <= T. One that the DAG's tasks reach only if its instances overlap cannot.
 bool can_bind(const TaskSet &task_set, DagId id) {
   const CompiledDag &dag = task_set.dags[id.value];
@@ -125,7 +130,8 @@ GlobalUnit unit_of(const TaskSet &task_set, std::uint32_t id) {
   result.limit = std::min(unit.limit, unit.period);
   result.tasks = static_cast<std::uint32_t>(unit.tasks.size());
   result.bound = dag.max_active > 0 && dag.max_active < result.tasks ? std::min(dag.max_active, workers) : 0;
-  set_width(result, std::min({workers, result.tasks, result.bound > 0 ? result.bound : result.tasks}));
+  result.abreast = most_side_by_side(task_set, unit.tasks);
+  set_width(result, std::min({workers, result.abreast, result.bound > 0 ? result.bound : result.abreast}));
   measure_paths(task_set, unit.tasks, result);
   return result;
 }
@@ -141,6 +147,7 @@ Units units_of(const TaskSet &task_set, const Needs &needs) {
     result.units.push_back(unit_of(task_set, u));
     GlobalUnit &unit = result.units.back();
     if (unit.bound > 0 && !can_bind(task_set, task_set.units[u].dag)) unit.bound = 0;
+    if (needs.groups) let_overlap(unit, result.workers);
   }
   std::sort(result.units.begin(), result.units.end(), [&](const GlobalUnit &a, const GlobalUnit &b) {
     return task_set.units[a.unit].first_rank < task_set.units[b.unit].first_rank;
@@ -169,6 +176,7 @@ bool assume_overlap(const TaskSet &task_set, GlobalUnit &unit) {
   unit.response = add(add(compiled.jitter, multiply(unit.period, unfinished + 1)), compiled.volume);
   constexpr Duration kLongest = Duration{1} << 44U;
   constexpr Duration kLargestLoad = 16;
+  let_overlap(unit, task_set.platform.workers);
   const Duration width = task_set.platform.workers;
   return unit.response < kLongest / width && compiled.volume / compiled.period < kLargestLoad * width;
 }
@@ -197,6 +205,7 @@ void narrow(const TaskSet &task_set, const Part &part, GlobalUnit &unit) {
   unit.volume = 0;
   for (const std::uint32_t t : part.tasks) unit.volume = add(unit.volume, task_set.tasks[t].wcet);
   unit.tasks = static_cast<std::uint32_t>(part.tasks.size());
+  unit.abreast = std::min(unit.abreast, unit.tasks);
   measure_paths(task_set, part.paths, unit);
 }
 
@@ -279,7 +288,7 @@ Duration largest_remaining(const TaskSet &task_set, const std::vector<GlobalUnit
     own.clear();
     for (const std::uint32_t t : task_set.units[units[u].unit].tasks) own.push_back(task_set.tasks[t].wcet - 1);
     std::sort(own.begin(), own.end(), std::greater<>());
-    own.resize(std::min<std::size_t>(own.size(), units[u].width));
+    if (units[u].bound > 0) own.resize(std::min<std::size_t>(own.size(), units[u].bound));
     all.insert(all.end(), own.begin(), own.end());
   }
   std::sort(all.begin(), all.end(), std::greater<>());

@@ -35,6 +35,7 @@ struct GlobalUnit {
   std::uint32_t width = 1;       // its jobs that can execute at once, never above the workers
   std::uint32_t bound = 0;       // max_active if it can bind, else 0
   std::uint32_t tasks = 1;       // their number
+  std::uint32_t abreast = 1;     // the most of them that can execute at once while no two instances overlap
   std::uint32_t path_tasks = 1;  // most tasks on a path
   Duration path_overhead = 0;    // the platform's part of `length`
   std::uint32_t unit = 0;        // position in TaskSet::units
@@ -151,7 +152,7 @@ class SharedTerms {
 };
 
 /// Sums the `count` largest remaining times of less urgent jobs that block something that became ready later, at most
-/// `width` of a unit. Each counts with "- 1", because it started at an instant strictly before.
+/// its max_active of a unit. Each counts with "- 1", because it started at an instant strictly before.
 [[nodiscard]] Duration largest_remaining(const TaskSet &task_set, const std::vector<GlobalUnit> &units,
                                          std::size_t from, std::uint32_t count);
 

@@ -26,7 +26,7 @@ class Window {
          std::span<Duration> works)
       : more_urgent_(more_urgent), own_(own), workers_(workers), blocking_(blocking), works_(works) {
     // Its other tasks that can execute while the critical path waits and max_active is not reached.
-    own_width_ = own.bound > 0 ? own.bound - 1 : own.tasks - 1;
+    own_width_ = std::min(own.abreast, own.bound > 0 ? own.bound : own.abreast) - 1;
     // The critical path need not be the longest one. With max_active a shorter one could matter, and all of the volume
     // counts.
     own_work_ = own.bound > 0 ? own.volume : own.volume - own.length;
@@ -119,9 +119,9 @@ using global::SharedTerms;
 
 // Sets a response at or below any that is found, and large enough for dag_work().
 void start_low(GlobalUnit &unit, std::uint32_t workers) {
-  const Duration more = unit.bound > 0         ? (unit.volume - unit.length) / unit.bound
-                        : unit.tasks > workers ? (unit.volume - unit.length) / static_cast<Duration>(workers)
-                                               : 0;
+  const Duration more = unit.bound > 0           ? (unit.volume - unit.length) / unit.bound
+                        : unit.abreast > workers ? (unit.volume - unit.length) / static_cast<Duration>(workers)
+                                                 : 0;
   unit.response = unit.length + more + unit.jitter;
 }
 

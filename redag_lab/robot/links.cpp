@@ -32,7 +32,10 @@ Result<Responses> bounds_of(const Workload &workload, const analysis::AnalysisPl
     const Result<analysis::TaskSet> task_set = analysis::compile(part.workload, analysis::platform_of(platform, part));
     if (!task_set) return tl::unexpected<Diagnostics>(task_set.error());
     const analysis::Report report = analysis::analyze(*task_set);
-    for (std::size_t t = 0; t < part.tasks.size(); ++t) responses.tasks[part.tasks[t].value] = report.tasks[t].response;
+    // Data of a job that is lost do not arrive at all.
+    for (std::size_t t = 0; t < part.tasks.size(); ++t) {
+      if (!report.tasks[t].bound.of_ended) responses.tasks[part.tasks[t].value] = report.tasks[t].response;
+    }
     for (std::size_t d = 0; d < part.dags.size(); ++d) responses.dags[part.dags[d].value] = report.dags[d].response;
   }
   return responses;

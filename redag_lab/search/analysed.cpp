@@ -61,7 +61,8 @@ std::string why_no_bound(const Analysed &analysed, std::size_t index, bool is_da
 
 void judge(const Analysed &analysed, Row &row, std::size_t index, bool is_dag) {
   row.says = row.tightest.method;
-  if (row.tightest.response && row.due) row.slack = *row.due - *row.tightest.response;
+  const bool can_lose = row.tightest.bound.of_ended;
+  if (row.tightest.response && row.due && !can_lose) row.slack = *row.due - *row.tightest.response;
   if (!row.tightest.response) row.reason = why_no_bound(analysed, index, is_dag);
   const analysis::Method *test = accepting_test(analysed);
   const bool is_met = row.slack.value_or(-1) >= 0;
@@ -74,6 +75,11 @@ void judge(const Analysed &analysed, Row &row, std::size_t index, bool is_dag) {
     row.standing = Standing::Ok;
   } else if (!row.tightest.response) {
     row.standing = row.due || test == nullptr ? Standing::NoBound : Standing::NoDeadline;
+  } else if (can_lose) {
+    const std::string &refusal = analysed.task_set.tasks[index].refusal;
+    row.standing = Standing::MayLose;
+    row.reason =
+        refusal.empty() ? "the next release, or data that are missing, can cause a job of it to be skipped" : refusal;
   } else if (!row.due) {
     row.standing = Standing::NoDeadline;
   } else {

@@ -53,6 +53,7 @@ struct AnalysedPart {
 enum class Standing : std::uint8_t {
   Ok,          // a sound method shows that the deadline is met
   MayMiss,     // the tightest sound bound is above the deadline; bounds are safe, not always exact
+  MayLose,     // jobs that end answer within the bound; others can be skipped or cut off, whatever their deadline
   NoBound,     // no sound method bounds the response time
   NoDeadline,  // of a DAG without an end-to-end deadline: bounded, with no deadline to compare
 };

@@ -79,7 +79,7 @@ Score score_of_bounds(const analysis::TaskSet &task_set) {
   score.proven = report.verdict == analysis::Verdict::Schedulable;
   const auto see = [&score](const analysis::Tightest &tightest, Duration due) {
     ++score.judged;
-    if (!tightest.response || *tightest.response > due) ++score.missed;
+    if (!tightest.response || tightest.bound.of_ended || *tightest.response > due) ++score.missed;
     if (!tightest.response) {
       ++score.lost;
     } else {

@@ -34,7 +34,7 @@ bool is_overloaded(const analysis::TaskSet &task_set) {
 std::string obstacle_of(const Workload &workload, const analysis::AnalysisPlatform &platform) {
   const Result<analysis::TaskSet> task_set = analysis::compile(workload, platform);
   if (!task_set) return task_set.error().front().message;
-  if (!task_set->not_analysable.empty() && !task_set->has_waits) return "no method applies";
+  if (task_set->is_beyond_numbers) return task_set->not_analysable;
   if (const std::optional<std::string> why = why_impossible(*task_set)) return *why;
   const analysis::Report report = analysis::analyze(*task_set);
   std::optional<std::uint32_t> worst;
@@ -43,6 +43,7 @@ std::string obstacle_of(const Workload &workload, const analysis::AnalysisPlatfo
     const analysis::CompiledTask &task = task_set->tasks[t];
     if (meets_deadline(task, report.tasks[t].bound)) continue;
     if (!report.tasks[t].response) return task.name + " has no bound";
+    if (report.tasks[t].bound.of_ended) return "jobs of " + task.name + " can be lost";
     const Duration late = *report.tasks[t].response - std::min(task.deadline, task.limit);
     if (worst && late <= missing) continue;
     worst = t;

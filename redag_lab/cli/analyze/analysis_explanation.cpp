@@ -135,6 +135,8 @@ std::string explain_bound(const lab::Analysed &analysed, const lab::Row &row, co
       fmt::format("the largest contribution is {} of {} ({})", humanize_duration(terms.front().amount),
                   humanize_duration(response), format_percent(share(terms.front().amount, response)));
   const std::optional<lab::Row> late_dag = dag_that_may_miss(analysed, row);
+  if (row.standing == lab::Standing::MayLose)
+    return text + largest + fmt::format("\njobs that do not end in time can be lost: {}\n", row.reason);
   if (row.standing != lab::Standing::MayMiss && !late_dag) return text + largest + "; nothing needs to change\n";
   const std::string deadline = row.standing == lab::Standing::MayMiss
                                    ? ""

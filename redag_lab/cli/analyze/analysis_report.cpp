@@ -28,6 +28,7 @@ Tint tint_of(lab::Standing standing) {
   switch (standing) {
     case lab::Standing::Ok: return Tint::Good;
     case lab::Standing::MayMiss: return Tint::Bad;
+    case lab::Standing::MayLose:
     case lab::Standing::NoBound: return Tint::Caution;
     case lab::Standing::NoDeadline: return Tint::Faint;
   }
@@ -153,6 +154,7 @@ const char *to_string(lab::Standing standing) {
   switch (standing) {
     case lab::Standing::Ok: return "ok";
     case lab::Standing::MayMiss: return "MAY MISS";
+    case lab::Standing::MayLose: return "may lose jobs";
     case lab::Standing::NoBound: return "no bound";
     case lab::Standing::NoDeadline: return "-";
   }
@@ -193,9 +195,11 @@ std::string verdict_in_words(const lab::Analysed &analysed) {
   }
   std::size_t late = 0;
   std::size_t unbounded = 0;
+  std::size_t losing = 0;
   const auto count = [&](const std::vector<lab::Row> &rows) {
     for (const lab::Row &row : rows) {
       if (row.standing == lab::Standing::MayMiss) ++late;
+      if (row.standing == lab::Standing::MayLose) ++losing;
       if (row.standing == lab::Standing::NoBound && row.due) ++unbounded;
     }
   };
@@ -208,6 +212,7 @@ std::string verdict_in_words(const lab::Analysed &analysed) {
     if (number > 0) missing += fmt::format("{}{} {}", missing.empty() ? "" : ", ", plural(number, noun), what);
   };
   say(late_tasks, "task", "with a bound above the deadline");
+  say(losing, "task", "whose jobs can be lost");
   say(unbounded_tasks, "task", "without a bound");
   say(late - late_tasks, "DAG", "with a bound above the end-to-end deadline");
   say(unbounded - unbounded_tasks, "DAG", "with an end-to-end deadline and without a bound");
@@ -265,7 +270,7 @@ std::string summarise(const lab::Analysed &analysed, const StreamTraits &termina
     text += weakest->slack ? fmt::format("bound {}, slack {} ({}), by {}", humanize_up(*weakest->tightest.response),
                                          humanize_down(*weakest->slack), format_share(*weakest->slack, *weakest->due),
                                          weakest->says->name)
-                           : "no bound: " + weakest->reason;
+                           : (weakest->tightest.response ? "jobs can be lost: " : "no bound: ") + weakest->reason;
     text += "\n";
     if (!yes) {
       text += "suggested change: " +
