@@ -16,6 +16,9 @@ namespace redag::analysis {
 namespace {
 
 constexpr std::string_view kDemandExceeds = "the demand of all that can go first exceeds the workers";
+constexpr std::string_view kWaitsForData =
+    "jobs of a predecessor can be lost, and nothing bounds the time until the next";
+constexpr std::string_view kLosesData = "a job of it can be lost, and its data with it";
 constexpr int kMostQueued = 10'000;  // jobs of a task in one busy period
 
 // At most (window + jitter) / period + more events in any closed window.
@@ -42,6 +45,7 @@ class DemandBounds {
       : task_set_(task_set),
         released_(task_set.tasks.size()),
         since_(task_set.tasks.size()),
+        until_(task_set.tasks.size()),
         bounds_(task_set.tasks.size()) {
     std::vector<bool> known(task_set.tasks.size(), false);
     for (std::uint32_t t = 0; t < task_set.tasks.size(); ++t) count_releases(t, known);
@@ -60,6 +64,9 @@ class DemandBounds {
         const std::optional<Duration> before = since_[t];
         bound(t);
         changed = changed || since_[t] != before;
+      }
+      for (std::uint32_t t = 0; t < until_.size(); ++t) {
+        if (waits_for_data(t)) until_[t] = until_ready(t);
       }
       if (sweep == 0 && (!changed || task_set_.platform.workers == 1)) break;
     }
@@ -94,10 +101,31 @@ class DemandBounds {
     return device < task(t).devices.size() && task(t).devices[device].requests > 0;
   }
   [[nodiscard]] bool waits_for_data(std::uint32_t t) const { return !task(t).data && !task(t).predecessors.empty(); }
-  // A timer's job becomes ready before its next release is seen, or is skipped.
-  [[nodiscard]] Duration until_ready(std::uint32_t t) const { return add(task(t).replaced, task(t).jitter); }
+  // The longest time from a timer's release to its readiness, if something bounds it. Timers keep their periods where
+  // edges join rates: the next release that is not refused then ends the wait. Otherwise the predecessors have the same
+  // releases, and only jobs of these serve.
+  [[nodiscard]] std::optional<Duration> until_ready(std::uint32_t t) const {
+    const std::vector<std::uint32_t> &units = task_set_.dags[task(t).dag.value].units;
+    if (std::any_of(units.begin(), units.end(), [this](auto u) { return !task_set_.units[u].awaits.empty(); })) {
+      return add(task(t).replaced, task(t).jitter);
+    }
+    Duration latest = task(t).jitter;
+    for (const std::uint32_t p : task(t).predecessors) {
+      const std::optional<Duration> before = task(p).data ? std::nullopt : from_release(p);
+      if (!before) return std::nullopt;
+      latest = std::max(latest, *before);
+    }
+    return latest;
+  }
+  // The bound from the task's nominal release.
+  [[nodiscard]] std::optional<Duration> from_release(std::uint32_t t) const {
+    if (!since_[t]) return std::nullopt;
+    if (task(t).data) return add(*since_[t], task_set_.frozen);
+    const std::optional<Duration> ready = until_ready(t);
+    return ready ? std::optional(add(*since_[t], *ready)) : std::nullopt;
+  }
   [[nodiscard]] std::uint32_t place(std::uint32_t t) const {
-    return task_set_.mode == sched::Preemption::Full ? task(t).level : task(t).tier;
+    return task_set_.mode == sched::Preemption::None ? task(t).tier : task(t).level;
   }
   [[nodiscard]] bool is_capped(std::uint32_t t) const { return task_set_.dags[task(t).dag.value].max_active > 0; }
 
@@ -146,8 +174,8 @@ class DemandBounds {
   // first one ends after it begins.
   [[nodiscard]] Duration active(std::uint32_t t, Duration window) const {
     const Duration all = add(released_[t].in(window - 1), unfinished(t));
-    if (!since_[t]) return all;
-    const Duration since = add(*since_[t], waits_for_data(t) ? until_ready(t) : 0);
+    if (!since_[t] || (waits_for_data(t) && !until_[t])) return all;
+    const Duration since = add(*since_[t], until_[t].value_or(0));
     return std::min(all, released_[t].in(std::max<Duration>(0, add(window, since) - 2)));
   }
 
@@ -443,7 +471,8 @@ class DemandBounds {
       // Its jobs can have been unfinished before the period began.
       counts[t].more = add(counts[t].more, unfinished(t));
     } else if (waits_for_data(t)) {
-      counts[t].jitter = until_ready(t);
+      // One can have been released before the period.
+      counts[t].more = add(counts[t].more, 1);
     } else if (task(t).data) {
       std::optional<JobCount> least;
       for (const std::uint32_t p : task(t).predecessors) {
@@ -550,12 +579,9 @@ class DemandBounds {
         continue;
       }
       bound.of_ended = !is_lossless[task(t).unit];
-      const Duration late = task(t).data        ? task_set_.frozen
-                            : !bound.of_ended   ? *from_grid[t] - *since_[t]
-                            : waits_for_data(t) ? until_ready(t)
-                                                : task(t).jitter;
-      bound.response = add(*since_[t], late);
-      if (Effort::itemises(task(t).unit)) bound.terms = terms_of(t, late);
+      bound.response = task(t).data || bound.of_ended ? from_release(t) : from_grid[t];
+      if (!bound.response) bound.absent = kWaitsForData;
+      if (bound.response && Effort::itemises(task(t).unit)) bound.terms = terms_of(t, *bound.response - *since_[t]);
     }
     Bound bound;
     for (ResponseBound &one : bounds_) bound.tasks.push_back(if_bounded(std::move(one)));
@@ -564,8 +590,8 @@ class DemandBounds {
       whole.response = 0;
       for (const std::uint32_t t : dag.tasks) {
         if (!whole.response || !is_lossless[task(t).unit]) {
-          whole.response.reset();
-          whole.absent = since_[t] ? "a job of it can be lost, and its data with it" : kDemandExceeds;
+          whole = ResponseBound{};
+          whole.absent = since_[t] ? kLosesData : kDemandExceeds;
         } else if (*from_grid[t] >= *whole.response) {
           whole.response = *from_grid[t];
           whole.terms = bound.tasks[t].terms;
@@ -596,6 +622,7 @@ class DemandBounds {
   bool has_waits_ = false;
   std::vector<JobCount> released_;              // by TaskId
   std::vector<std::optional<Duration>> since_;  // by TaskId: from the release as seen, or from readiness, to the end
+  std::vector<std::optional<Duration>> until_;  // by TaskId: of timers that wait for data, until_ready()
   std::vector<ResponseBound> bounds_;
 };
 
