@@ -107,8 +107,7 @@ class Resolver {
     }
     for (Unit &unit : alone_.units) {
       unit.awaits.clear();
-      unit.has_edges = std::any_of(unit.tasks.begin(), unit.tasks.end(),
-                                   [&](std::uint32_t t) { return !alone_.tasks[t].predecessors.empty(); });
+      unit.has_edges = unit.tasks.size() > 1;
     }
   }
 

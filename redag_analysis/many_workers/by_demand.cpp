@@ -222,6 +222,13 @@ class DemandBounds {
       for (const std::uint32_t o : group) rivals.lifted[o] = lifts && !rivals.first[o];
     }
     if (task_set_.mode == sched::Preemption::Full) return;
+    // On top of a demoted job that lies on another one, everything can run.
+    const auto sinks = [&](std::uint32_t o) { return task(o).can_sink && (rivals.first[o] || rivals.lifted[o]); };
+    for (std::uint32_t o = 0; o < count && task_set_.mode == sched::Preemption::Cooperative && !rivals.all; ++o) {
+      if (!sinks(o)) continue;
+      rivals.all = true;
+      return close(last, rivals);
+    }
     std::vector<Duration> stretches;
     for (std::uint32_t other = 0; other < count; ++other) {
       // A demoted job keeps its worker, too.
