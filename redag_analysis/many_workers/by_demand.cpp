@@ -52,6 +52,7 @@ class DemandBounds {
     const std::uint32_t threads = task_set.platform.max_started;
     few_threads_ = task_set.mode == sched::Preemption::Full && threads > 0 && threads < most_started();
     has_order_ = is_static(task_set.policy);
+    for (const CompiledTask &task : task_set.tasks) stop_ = std::max(stop_, multiply(task.period, 64));
     has_waits_ =
         std::any_of(task_set.tasks.begin(), task_set.tasks.end(), [](const auto &t) { return t.wake_ups > 0; });
   }
@@ -80,7 +81,6 @@ class DemandBounds {
     std::vector<bool> lifted;    // less urgent holders of groups of those
     std::vector<bool> held_for;  // those for which the task can wait while workers are idle: the rest of its group
     std::vector<bool> fills;     // the rest of its DAG, if a max_active can bind
-    std::vector<bool> waits;     // those whose waits at devices can delay it
     bool all = false;
     bool finds_one = false;    // of less urgent holders of its group, it waits for one
     Duration cap = 0;          // the max_active of its DAG
@@ -181,32 +181,40 @@ class DemandBounds {
 
   // ---- who can go first ----
 
-  // `all`: as if every task could go first.
-  [[nodiscard]] Rivals rivals_of(std::uint32_t t, bool all) const {
-    const std::size_t count = task_set_.tasks.size();
+  // `all`: as if every task could go first. `closed`: nothing less urgent fills a DAG of these, or lies under others.
+  [[nodiscard]] Rivals rivals_of(std::uint32_t t, bool all, bool closed) const {
     Rivals rivals;
-    rivals.held_for.assign(count, false);
-    rivals.fills.assign(count, false);
-    rivals.lifted.assign(count, false);
+    for (std::vector<bool> *marks : {&rivals.held_for, &rivals.fills, &rivals.lifted}) {
+      marks->assign(task_set_.tasks.size(), false);
+    }
+    rivals.cap = task_set_.dags[task(t).dag.value].max_active;
+    rivals.divisor = task_set_.platform.workers;
     const bool is_ordered = has_order_ && !few_threads_ && !task(t).can_sink;
     rivals.all = all || !is_ordered;
-    std::uint32_t last = place(t);
-    if (task(t).group != kNoGroup) {
-      for (const std::uint32_t other : task_set_.groups[task(t).group]) {
-        rivals.held_for[other] = other != t;
-        // The holder has the urgency of those that wait, but one that lies under others stays there.
-        if (task_set_.mode == sched::Preemption::Cooperative) last = std::max(last, place(other));
-      }
-    }
-    if (is_capped(t)) {
-      for (const std::uint32_t other : task_set_.dags[task(t).dag.value].tasks) {
-        rivals.fills[other] = other != t;
-        rivals.all = rivals.all || task(other).can_sink;
-        last = std::max(last, place(other));
-      }
-    }
     // Whoever is less urgent takes a group only if the task does not wait for it.
-    rivals.finds_one = is_ordered && !is_capped(t);
+    rivals.finds_one = is_ordered && rivals.cap == 0;
+    std::uint32_t last = place(t);
+    const auto include = [&](const std::vector<std::uint32_t> &tasks) {
+      const bool is_asked = std::any_of(tasks.begin(), tasks.end(),
+                                        [&](std::uint32_t o) { return o == t || (closed && place(o) <= last); });
+      const std::uint32_t before = last;
+      for (const std::uint32_t o : tasks) last = std::max(last, is_asked ? place(o) : 0);
+      return last != before;
+    };
+    for (bool changed = true; changed;) {
+      changed = false;
+      for (const CompiledDag &dag : task_set_.dags) changed = (dag.max_active > 0 && include(dag.tasks)) || changed;
+      // The holder has the urgency of those that wait, but one that lies under others stays there.
+      if (task_set_.mode != sched::Preemption::Cooperative) continue;
+      for (const std::vector<std::uint32_t> &group : task_set_.groups) changed = include(group) || changed;
+    }
+    for (std::uint32_t o = 0; o < task_set_.tasks.size(); ++o) {
+      rivals.held_for[o] = o != t && task(o).group != kNoGroup && task(o).group == task(t).group;
+      rivals.fills[o] = o != t && rivals.cap > 0 && task(o).dag == task(t).dag;
+      // What fills a DAG can be demoted below everything else.
+      const bool fills_some = rivals.fills[o] || (closed && is_capped(o) && place(o) <= last);
+      rivals.all = rivals.all || (fills_some && task(o).can_sink);
+    }
     close(last, rivals);
     return rivals;
   }
@@ -264,28 +272,22 @@ class DemandBounds {
 
   // The longest time from the release of a job as seen, or from its readiness, to its end.
   std::optional<Duration> window_of(std::uint32_t t, bool all) {
-    Rivals rivals = rivals_of(t, all);
-    rivals.divisor = task_set_.platform.workers;
-    if (task_set_.mode == sched::Preemption::Cooperative) {
-      // A job can lie under others on its worker while further workers are idle.
-      const auto can_lie = [this](std::uint32_t o) { return task(o).region < executes(o) || task(o).wake_ups > 0; };
-      bool lies = can_lie(t);
-      for (std::uint32_t o = 0; o < task_set_.tasks.size(); ++o) {
-        lies = lies || ((rivals.held_for[o] || rivals.fills[o]) && can_lie(o));
-      }
-      if (lies) rivals.divisor = 1;
-    }
-    rivals.cap = task_set_.dags[task(t).dag.value].max_active;
+    Rivals rivals = rivals_of(t, all, false);
+    bool waits = false;
     for (std::uint32_t o = 0; o < task_set_.tasks.size(); ++o) {
-      if (rivals.fills[o])
-        rivals.fills_apart = rivals.fills_apart || rivals.cap < rivals.divisor || task(o).wake_ups > 0;
+      waits = waits || (rivals.fills[o] && task(o).wake_ups > 0);
+      // A job can lie under others on its worker while further workers are idle.
+      const bool can_lie = task(o).region < executes(o) || task(o).wake_ups > 0;
+      const bool is_asked = o == t || rivals.held_for[o] || rivals.fills[o];
+      if (task_set_.mode == sched::Preemption::Cooperative && is_asked && can_lie) rivals.divisor = 1;
     }
+    rivals.fills_apart = rivals.cap > 0 && (rivals.cap < rivals.divisor || waits);
     const bool is_plain = !task(t).data && task(t).predecessors.empty();
     const Duration queued = std::max<Duration>(1, task(t).limit / task(t).period);
     for (const Duration earlier : {Duration{0}, task(t).at_once + queued - 1}) {
       if (earlier == 0 && (!is_plain || task(t).at_once > 1)) continue;
       const Duration whole = add(executes(t), away(t));
-      const std::optional<Duration> one = fixed_point(t, [&](Duration x) {
+      const std::optional<Duration> one = fixed_point([&](Duration x) {
         const Window parts = evaluate(t, rivals, earlier, x);
         return add(multiply(whole, earlier + 1), add(parts.apart, parts.workers));
       });
@@ -298,9 +300,9 @@ class DemandBounds {
   }
 
   template <class Next>
-  [[nodiscard]] std::optional<Duration> fixed_point(std::uint32_t t, Next next) const {
+  [[nodiscard]] std::optional<Duration> fixed_point(Next next) const {
     Duration x = 1;
-    return global::least_fixed_point(stop_of(t), x, next) ? std::optional(x) : std::nullopt;
+    return global::least_fixed_point(stop_, x, next) ? std::optional(x) : std::nullopt;
   }
 
   // A window for each stretch of execution and each request to a device. Others delay it only in these.
@@ -308,24 +310,18 @@ class DemandBounds {
     if (task(t).wake_ups == 0 || task(t).group != kNoGroup || is_capped(t) || few_threads_) return std::nullopt;
     Duration sum = task(t).elsewhere;
     for (const Duration stretch : task(t).stretches) {
-      const auto found = fixed_point(t, [&](Duration x) { return add(stretch, evaluate(t, rivals, 0, x).workers); });
+      const auto found = fixed_point([&](Duration x) { return add(stretch, evaluate(t, rivals, 0, x).workers); });
       if (!found) return std::nullopt;
       sum = add(sum, *found);
     }
     for (std::size_t d = 0; d < task_set_.devices.size(); ++d) {
       if (!uses(t, d)) continue;
       const DeviceUse &use = task(t).devices[d];
-      const auto found = fixed_point(t, [&](Duration x) { return add(use.longest, queue_at(t, d, rivals, x)); });
+      const auto found = fixed_point([&](Duration x) { return add(use.longest, queue_at(t, d, rivals, x)); });
       if (!found) return std::nullopt;
       sum = add(sum, multiply(*found, use.requests));
     }
     return sum;
-  }
-
-  [[nodiscard]] Duration stop_of(std::uint32_t t) const {
-    Duration longest = task(t).period;
-    for (const CompiledTask &other : task_set_.tasks) longest = std::max(longest, other.period);
-    return multiply(longest, 64);
   }
 
   // Each tick that others execute counts once: where it can delay the job the most.
@@ -432,42 +428,7 @@ class DemandBounds {
 
   // ---- one worker: the busy period of a level ----
 
-  // The level: what can go first, with all that its jobs can wait for, but for holders that it lifts.
-  [[nodiscard]] Rivals level_of(std::uint32_t t, bool all) const {
-    Rivals rivals;
-    rivals.lifted.assign(task_set_.tasks.size(), false);
-    rivals.all = all || !has_order_ || few_threads_ || task(t).can_sink;
-    std::uint32_t last = place(t);
-    const auto include = [&](const std::vector<std::uint32_t> &tasks) {
-      if (std::none_of(tasks.begin(), tasks.end(), [&](std::uint32_t o) { return place(o) <= last; })) return false;
-      const std::uint32_t before = last;
-      for (const std::uint32_t o : tasks) last = std::max(last, place(o));
-      return last != before;
-    };
-    for (bool changed = !rivals.all; changed;) {
-      changed = false;
-      for (const CompiledDag &dag : task_set_.dags) changed = (dag.max_active > 0 && include(dag.tasks)) || changed;
-      if (task_set_.mode != sched::Preemption::Cooperative) continue;
-      for (const std::vector<std::uint32_t> &group : task_set_.groups) changed = include(group) || changed;
-    }
-    for (const CompiledDag &dag : task_set_.dags) {
-      if (dag.max_active == 0) continue;
-      const bool is_in = std::any_of(dag.tasks.begin(), dag.tasks.end(), [&](auto o) { return place(o) <= last; });
-      const bool sinks = std::any_of(dag.tasks.begin(), dag.tasks.end(), [&](auto o) { return task(o).can_sink; });
-      rivals.all = rivals.all || (is_in && sinks);
-    }
-    close(last, rivals);
-    return rivals;
-  }
-
   // What becomes ready in a busy period of the level, in a closed window that begins with it.
-  [[nodiscard]] std::vector<JobCount> begun_in(const Rivals &level) const {
-    std::vector<JobCount> counts(task_set_.tasks.size());
-    std::vector<bool> known(counts.size(), false);
-    for (std::uint32_t t = 0; t < counts.size(); ++t) count_begun(t, level, counts, known);
-    return counts;
-  }
-
   void count_begun(std::uint32_t t, const Rivals &level, std::vector<JobCount> &counts,
                    std::vector<bool> &known) const {
     if (known[t]) return;
@@ -493,12 +454,14 @@ class DemandBounds {
   }
 
   std::optional<Duration> busy_period_of(std::uint32_t t, bool all) {
-    const Rivals level = level_of(t, all);
-    const std::vector<JobCount> counts = begun_in(level);
-    const std::size_t count = counts.size();
+    const Rivals level = rivals_of(t, all, true);
+    const std::size_t count = task_set_.tasks.size();
+    std::vector<JobCount> counts(count);
+    std::vector<bool> known(count, false);
     std::vector<Duration> costs(count, 0);
     double load = 0;
     for (std::uint32_t o = 0; o < count; ++o) {
+      count_begun(o, level, counts, known);
       costs[o] = add(add(executes(o), away(o)), multiply(level.blocking, task(o).wake_ups));
       if (level.first[o]) load += static_cast<double>(costs[o]) / static_cast<double>(counts[o].period);
     }
@@ -522,9 +485,8 @@ class DemandBounds {
       for (std::size_t d = 0; d < task_set_.devices.size(); ++d) sum = add(sum, served_before(level, d, window));
       return sum;
     };
-    const Duration stop = stop_of(t);
     Duration length = 1;
-    if (!global::least_fixed_point(stop, length, [&](Duration window) { return demand(window, 0); })) {
+    if (!global::least_fixed_point(stop_, length, [&](Duration window) { return demand(window, 0); })) {
       return std::nullopt;
     }
     if (task(t).at_once > 1) return length;
@@ -533,7 +495,7 @@ class DemandBounds {
     Duration longest = 0;
     Duration window = 1;
     for (Duration q = 0; q < jobs; ++q) {
-      if (!global::least_fixed_point(stop, window, [&](Duration w) { return demand(w, q + 1); })) return length;
+      if (!global::least_fixed_point(stop_, window, [&](Duration w) { return demand(w, q + 1); })) return length;
       longest = std::max(longest, window - std::min(window, counts[t].earliest(q + 1)));
     }
     return longest;
@@ -614,11 +576,10 @@ class DemandBounds {
   }
 
   [[nodiscard]] std::vector<Term> terms_of(std::uint32_t t, Duration late) const {
+    const Duration own = std::min(*since_[t], executes(t) - task(t).overhead);
     const DagId dag = task(t).dag;
-    std::vector<Term> terms;
-    const Duration own = std::min(*since_[t], task(t).wcet - task(t).waits - task(t).overhead);
-    terms.push_back(Term{Term::Kind::Own, TaskId(t), dag, own, 1});
-    terms.push_back(Term{Term::Kind::Interference, {}, {}, *since_[t] - own, 0});
+    std::vector<Term> terms = {Term{Term::Kind::Own, TaskId(t), dag, own, 1},
+                               Term{Term::Kind::Interference, {}, {}, *since_[t] - own, 0}};
     if (late > 0) terms.push_back(Term{waits_for_data(t) ? Term::Kind::Wait : Term::Kind::Jitter, {}, dag, late, 0});
     return terms;
   }
@@ -627,6 +588,7 @@ class DemandBounds {
   bool has_order_ = false;
   bool few_threads_ = false;
   bool has_waits_ = false;
+  Duration stop_ = 0;                           // longer windows count as none
   std::vector<JobCount> released_;              // by TaskId
   std::vector<std::optional<Duration>> since_;  // by TaskId: from the release as seen, or from readiness, to the end
   std::vector<std::optional<Duration>> until_;  // by TaskId: of timers that wait for data, until_ready()
