@@ -10,6 +10,7 @@
 
 #include "redag/loader/workload_yaml.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
+#include "redag_analysis/analyze/executors.hpp"
 #include "redag_analysis/many_workers/by_demand.hpp"
 #include "tests/testing/bound_property.hpp"
 #include "tests/testing/random_workloads.hpp"
@@ -114,6 +115,7 @@ TEST(Composition, PublishedAndReportedCases) {
       // M. Harbour, M. Klein, J. Lehoczky, Fixed priority scheduling of periodic tasks with varying execution priority,
       // RTSS 1991.
       {"varying_priorities", {{"t1", 28'000}, {"t2", 98'000}, {"t3", 47'000}, {"t4", 195'000}, {"t5", 223'000}}},
+      {"wait_below", {{"x.fast", 14'000}, {"x.slow", 149'000}}},
       {"robot", {{"joints.controller", 400}, {"state.ekf", 800}, {"vision.camera", 2700}, {"vision", 32'200}}},
   };
   for (const Case &one : cases) {
@@ -127,6 +129,43 @@ TEST(Composition, PublishedAndReportedCases) {
       EXPECT_EQ((*found.at(name) + 999) / 1000, most) << one.file << ": " << name;
     }
   }
+}
+
+// Of the unit a, b, c only a and b are more urgent than c, which no method but the last resort covers. They do not wait
+// for each other, and can keep two workers busy at once.
+TEST(Composition, APartOfAUnitIsNoTask) {
+  const auto loaded = parse_workload(R"(
+platform: {workers: 3, preemption: os}
+policy: fixed
+ties: fixed
+dags:
+  - name: d
+    tasks:
+      - {name: a, wcet: 2ms, period: 18ms, priority: 4}
+      - {name: b, wcet: 1ms, period: 18ms, priority: 4}
+      - {name: c, wcet: 3ms, activation: data, after: [a, b], priority: 1, concurrency: 2}
+  - name: e
+    tasks:
+      - {name: x, wcet: 1ms, period: 14ms, priority: 3}
+      - {name: y, wcet: 6ms, period: 14ms, priority: 2}
+)",
+                                     "unit.yaml");
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  const TaskSet task_set = testing::compiled(loaded->workload);
+  const Tightest y = analysed(task_set).tasks[4];
+  ASSERT_TRUE(y.response);
+  EXPECT_EQ(*y.response, 7 * kMillisecond);
+}
+
+// The bounds of any order see that the jobs of a chain follow each other.
+TEST(Composition, ChainsOnTwoThreadsOfTheMultiThreadedExecutor) {
+  const Workload workload = read("mte_chains");
+  const executors::ExecutorKind &mte = *executors::find_executor("mte");
+  const auto task_set = compile_for(mte, workload, platform_of(workload));
+  ASSERT_TRUE(task_set) << to_string(task_set.error());
+  const Report report = analyze(*task_set, methods_of(mte));
+  const Duration most[] = {58'200, 72'300, 58'200};  // microseconds
+  for (std::size_t d = 0; d < 3; ++d) EXPECT_EQ(report.dags[d].response.value_or(0) / kMicrosecond, most[d]);
 }
 
 }  // namespace

@@ -203,6 +203,8 @@ struct Tried {
   std::uint64_t workloads = 0;
   std::uint64_t with_bounds = 0;
   std::uint64_t jobs = 0;
+  std::uint64_t tasks = 0;
+  std::uint64_t bounded_tasks = 0;
 };
 
 void check(std::uint64_t seed, Tried &tried) {
@@ -221,6 +223,8 @@ void check(std::uint64_t seed, Tried &tried) {
   const FeatureSet features = features_of(run.workload, run.config);
   ++tried.workloads;
   tried.checked.add(features);
+  tried.tasks += claims.tasks.size();
+  for (const std::optional<Duration> &task : claims.tasks) tried.bounded_tasks += task ? 1U : 0U;
   tried.with_bounds += claims.bounded.empty() ? 0U : 1U;
   for (const FeatureSet &bounded : claims.bounded) tried.bounded.add(bounded);
   for (int repetition = 0; repetition < (claims.bounded.empty() ? 1 : 4); ++repetition) {
@@ -267,10 +271,14 @@ TEST(Everything, KeepsTheModelAndItsBounds) {
     SCOPED_TRACE(fmt::format("replay with REDAG_SEED={} REDAG_EVERYTHING=1", seed));
     check(seed, tried);
   }
-  fmt::print("[ figures  ] {} workloads, {} with bounds, {} jobs\n[ figures  ] checked: {}\n[ figures  ] bounded: {}\n",
-             tried.workloads, tried.with_bounds, tried.jobs, tried.checked.to_string(), tried.bounded.to_string());
+  fmt::print(
+      "[ figures  ] {} workloads, {} with bounds, {} of {} tasks, {} jobs\n[ figures  ] checked: {}\n[ figures  ] "
+      "bounded: {}\n",
+      tried.workloads, tried.with_bounds, tried.bounded_tasks, tried.tasks, tried.jobs, tried.checked.to_string(),
+      tried.bounded.to_string());
   std::fflush(stdout);
   if (count < 2000 || HasFailure()) return;
+  EXPECT_GT(tried.bounded_tasks * 100, tried.tasks * 75) << "the demand of most tasks fits";
   EXPECT_EQ(never(tried.checked), "");
   EXPECT_EQ(never(tried.bounded), "");
 }
