@@ -173,11 +173,14 @@ void expect_every_schedule_within_bounds(std::uint32_t workers, sched::Preemptio
     do {
       skipped += simulate(bound_case, task_set, choices.demands, horizon, worst);
     } while (choices.next());
-    ASSERT_EQ(skipped, 0) << "seed " << seed << "\n" << describe(bound_case);
+    const bool can_lose = std::any_of(report.tasks.begin(), report.tasks.end(),
+                                      [](const Tightest &task) { return task.bound.of_ended; });
+    ASSERT_TRUE(skipped == 0 || can_lose) << "seed " << seed << "\n" << describe(bound_case);
     for (std::size_t t = 0; t < worst.size(); ++t) {
       ASSERT_LE(worst[t], *report.tasks[t].response)
           << report.tasks[t].method->name << ", task " << t << ", seed " << seed << "\n"
           << describe(bound_case);
+      if (can_lose) continue;
       reached += worst[t] == *report.tasks[t].response ? 1U : 0U;
       ++tasks;
     }
