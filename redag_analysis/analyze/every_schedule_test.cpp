@@ -173,8 +173,8 @@ void expect_every_schedule_within_bounds(std::uint32_t workers, sched::Preemptio
     do {
       skipped += simulate(bound_case, task_set, choices.demands, horizon, worst);
     } while (choices.next());
-    const bool can_lose = std::any_of(report.tasks.begin(), report.tasks.end(),
-                                      [](const Tightest &task) { return task.bound.of_ended; });
+    const bool can_lose =
+        std::any_of(report.tasks.begin(), report.tasks.end(), [](const Tightest &task) { return task.bound.of_ended; });
     ASSERT_TRUE(skipped == 0 || can_lose) << "seed " << seed << "\n" << describe(bound_case);
     for (std::size_t t = 0; t < worst.size(); ++t) {
       ASSERT_LE(worst[t], *report.tasks[t].response)
