@@ -113,8 +113,10 @@ void events_target(std::string_view input) {
     REDAG_CHECK(sum == one.length(), "parts sum to the whole");
   }
   const std::string &folder = scratch_folder();
-  const auto jobs = metrics::fold_jobs(trace->info.workload, trace->events);
-  REDAG_CHECK(metrics::write_jobs_csv(folder + "/jobs.csv", trace->info.workload, jobs).has_value(), "jobs.csv");
+  auto jobs = metrics::JobsCsvWriter::create(folder + "/jobs.csv", trace->info.workload);
+  REDAG_CHECK(jobs.has_value(), "a place for jobs.csv");
+  jobs->add(trace->events);
+  REDAG_CHECK(jobs->commit().has_value(), "jobs.csv");
   REDAG_CHECK(metrics::write_perfetto(folder + "/trace.pftrace", *trace).has_value(), "trace.pftrace");
   std::vector<report::Group> groups;
   report::GroupReader reader("fuzz", report::digest_options(1));

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Writes and reads jobs.csv: a row per job, for spreadsheets and data frames. Columns: docs/results_format.md. Pure
+// Writes jobs.csv: a row per job, for spreadsheets and data frames. Columns: docs/results_format.md. Pure
 // except for the file.
 #pragma once
 
@@ -18,15 +18,6 @@
 #include "redag_analysis/metrics/jobs.hpp"
 
 namespace redag::metrics {
-
-/// Quotes a field by RFC 4180, if it needs quotes.
-[[nodiscard]] std::string csv_quoted(const std::string &text);
-
-/// The fields "dag,task" by TaskId.
-[[nodiscard]] std::vector<std::string> csv_task_names(const Workload &workload);
-
-/// The first line of the file.
-[[nodiscard]] std::string_view jobs_csv_header();
 
 /// Writes the jobs of a run while it goes on. Rows are in order of release. Only where more than kMostHeldJobs jobs
 /// have ended since a job was released that still has not, they are written before it, so that memory stays bounded.
@@ -57,17 +48,5 @@ class JobsCsvWriter {
   std::size_t most_held_;
   std::uint64_t next_ = 0;  // the sequence number of the row that is due
 };
-
-/// Writes all jobs, in the given order.
-[[nodiscard]] Result<void> write_jobs_csv(const std::string &path, const Workload &workload,
-                                          std::span<const JobRecord> jobs);
-
-/// Reads what write_jobs_csv() wrote, and looks up DAGs and tasks by name in `workload`. Derived columns are ignored.
-/// Errors name file and line.
-[[nodiscard]] Result<std::vector<JobRecord>> read_jobs_csv(const std::string &path, const Workload &workload);
-
-/// Parses text in memory in the same way; errors call it `file`.
-[[nodiscard]] Result<std::vector<JobRecord>> parse_jobs_csv(std::string_view text, const std::string &file,
-                                                            const Workload &workload);
 
 }  // namespace redag::metrics
