@@ -49,7 +49,7 @@ void JobFolder::add(const JobEvent &event) {
     job.record.release = event.value;
     job.record.seen = event.time;
     job.record.deadline = event.value + task.deadline;
-    job.stay = StayClock(event.value);
+    job.since = event.value;
     task.live.push_back(job);
     return;
   }
@@ -66,7 +66,6 @@ void JobFolder::add(const JobEvent &event) {
     case JobEventKind::Ready:
       record.ready = event.time;
       record.origin = event.value;
-      found->stay.move(Stay::Ready, event.time);
       break;
     case JobEventKind::Deferred: record.deferred = true; break;
     case JobEventKind::Dispatched:
@@ -74,19 +73,19 @@ void JobFolder::add(const JobEvent &event) {
       if (!record.has_started()) record.start = event.time;
       record.worker = event.worker;
       record.deadline = event.value;
-      found->stay.move(Stay::OnWorker, event.time);
+      found->move(true, event.time);
       break;
     case JobEventKind::Started: record.start = event.value; break;  // exact, even if the event was delivered late
     case JobEventKind::Preempted:
       ++record.preemptions;
-      found->stay.move(Stay::Preempted, event.time);
+      found->move(false, event.time);
       break;
-    case JobEventKind::Waits: found->stay.move(event.value < 0 ? Stay::Waits : Stay::DeviceQueue, event.time); break;
-    case JobEventKind::Served: found->stay.move(Stay::Device, event.time); break;
-    case JobEventKind::Woken: found->stay.move(Stay::Ready, event.time); break;
-    case JobEventKind::Resumed: found->stay.move(Stay::OnWorker, event.time); break;
+    case JobEventKind::Waits: found->move(false, event.time); break;
+    case JobEventKind::Resumed: found->move(true, event.time); break;
     case JobEventKind::Executed: record.processor = event.value; break;
     case JobEventKind::Exceeded: record.exceeded = true; break;
+    case JobEventKind::Served:
+    case JobEventKind::Woken:
     case JobEventKind::HighMode:
     case JobEventKind::LowMode: break;
     case JobEventKind::Finished:
@@ -95,11 +94,12 @@ void JobFolder::add(const JobEvent &event) {
   }
 }
 
-JobRecord JobFolder::Live::timed() const {
-  JobRecord timed = record;
-  timed.split = stay.split();
-  timed.on_worker = timed.split[Stay::OnWorker];
-  return timed;
+void JobFolder::Live::move(bool onto_worker, Time now) {
+  if (now > since) {
+    if (is_on_worker) record.on_worker += now - since;
+    since = now;
+  }
+  is_on_worker = onto_worker;
 }
 
 void JobFolder::end(TaskJobs &task, std::size_t index, const JobEvent &event) {
@@ -112,8 +112,10 @@ void JobFolder::end(TaskJobs &task, std::size_t index, const JobEvent &event) {
     job.record.finish = event.value;
   }
   job.record.reason = event.reason;
-  job.stay.end(job.record.finish);
-  ended_.push_back(job.timed());
+  job.move(false, job.record.finish);
+  // On threads, the end of a body can precede the decision that took its worker.
+  job.record.on_worker -= std::min(job.since - job.record.finish, job.record.on_worker);
+  ended_.push_back(job.record);
   task.live.erase(task.live.begin() + static_cast<std::ptrdiff_t>(index));
 }
 
@@ -122,7 +124,7 @@ std::vector<JobRecord> JobFolder::take_ended() { return std::exchange(ended_, {}
 std::vector<JobRecord> JobFolder::in_flight() const {
   std::vector<JobRecord> records;
   for (const TaskJobs &task : tasks_) {
-    for (const Live &job : task.live) records.push_back(job.timed());
+    for (const Live &job : task.live) records.push_back(job.record);
   }
   std::sort(records.begin(), records.end(), released_earlier);
   return records;

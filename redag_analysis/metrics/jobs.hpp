@@ -12,7 +12,6 @@
 
 #include "redag/model/job_event.hpp"
 #include "redag/model/workload.hpp"
-#include "redag_analysis/metrics/response_split.hpp"
 
 namespace redag::metrics {
 
@@ -40,7 +39,6 @@ struct JobRecord {
   bool exceeded = false;  // used its budget and continued; not in jobs.csv
   JobOutcome outcome = JobOutcome::InFlight;
   Reason reason = Reason::None;
-  ResponseSplit split;  // up to its last event; of a finished job the sum is its response time; not in jobs.csv
 
   [[nodiscard]] bool has_started() const { return start != kNever; }
   /// f - r and f - ready. Both require a finished job.
@@ -78,10 +76,11 @@ class JobFolder {
  private:
   struct Live {
     JobRecord record;
-    StayClock stay;
+    Time since = 0;  // its latest change
+    bool is_on_worker = false;
 
-    /// The record, with the times that the clock has counted.
-    [[nodiscard]] JobRecord timed() const;
+    /// Counts the time on a worker up to `now`. Earlier times than before count as the latest one.
+    void move(bool onto_worker, Time now);
   };
   struct TaskJobs {
     Duration deadline = 0;

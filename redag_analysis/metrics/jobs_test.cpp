@@ -88,6 +88,19 @@ TEST(JobFolder, IsTheSameInAnyPortions) {
   }
 }
 
+// Waits, preemptions and, on threads, a body that ends before the decision to preempt it.
+TEST(FoldJobs, CountsTheTimeOnAWorkerAndNoOther) {
+  TraceBuilder t(make_workload({make_dag("a", {{"t", 100}})}, 1, PreemptionMode::Os));
+  t.at(2).released_for("t", 0, 0).at(3).ready("t", 0, 0).at(7).dispatched("t", 0, 0, 100).at(8).started("t", 0, 0);
+  t.at(12).preempted("t", 0, 0).at(18).resumed("t", 0, 0);                                              // 5 ms
+  t.at(19).waits("t", 0, 0, 0).at(26).served("t", 0, 0).at(34).woken("t", 0, 0);                        // 1 ms
+  t.at(36).resumed("t", 0, 0).at(37).waits("t", 0, 0, -1).at(46).woken("t", 0, -1).resumed("t", 0, 0);  // 1 ms
+  trace::Trace trace = t.at(50).preempted("t", 0, 0).finished("t", 0, 0).until(60);                     // 4 ms
+  EXPECT_EQ(fold_jobs(trace.info.workload, trace.events).at(0).on_worker, 11 * kMs);
+  trace.events.back().value = 48 * kMs;
+  EXPECT_EQ(fold_jobs(trace.info.workload, trace.events).at(0).on_worker, 9 * kMs);
+}
+
 TEST(JobFolder, CountsWhatItCannotPlace) {
   trace::Trace trace = example().until(30);
   JobFolder folder(trace.info.workload);

@@ -129,7 +129,6 @@ void Summarizer::count(const JobRecord &job, Time end) {
   samples.response.add(job.response());
   samples.response_from_ready.add(job.response_from_ready());
   samples.on_worker.add(job.on_worker);
-  stats_[task].split.add(job.split);
   if (is_sink_[task]) end_to_end_[task].add(job.finish - job.origin);
 }
 

@@ -69,7 +69,6 @@ struct JobStats : JobCounts {
   Distribution response_from_ready;  // f - ready
   Distribution start_latency;        // start - ready; not of jobs without data
   Distribution on_worker;            // time on a worker; the execution time where nothing else could run there
-  ResponseSplits split;              // finished jobs
 };
 
 /// The answers of one sink, from a source's release to the sink's finish.

@@ -23,19 +23,12 @@ Json reasons_to_json(const JobCounts &stats) {
   return json;
 }
 
-Json to_json(const ResponseSplit &split) {
-  Json json = Json::object();
-  for (std::size_t i = 0; i < kStays; ++i) json[std::string(to_string(static_cast<Stay>(i))) + "_ns"] = split.length[i];
-  return json;
-}
-
 Json to_json(const JobStats &stats) {
   Json json = to_json(static_cast<const JobCounts &>(stats));
   json["response"] = to_json(stats.response);
   json["response_from_ready"] = to_json(stats.response_from_ready);
   json["start_latency"] = to_json(stats.start_latency);
   json["on_worker"] = to_json(stats.on_worker);
-  json["response_split"] = {{"total", to_json(stats.split.total)}, {"longest", to_json(stats.split.longest)}};
   return json;
 }
 
