@@ -8,7 +8,6 @@
 #include <set>
 
 #include "redag/sched/policy.hpp"
-#include "redag_lab/search/audsley.hpp"
 
 namespace redag::lab {
 namespace {
@@ -48,8 +47,7 @@ std::vector<std::uint32_t> with(std::vector<std::uint32_t> values, std::uint32_t
 
 }  // namespace
 
-std::vector<NamedOrder> orders_to_try(const Workload &workload, const analysis::AnalysisPlatform &platform,
-                                      Objective objective, const std::function<bool()> &stop) {
+std::vector<NamedOrder> orders_to_try(const Workload &workload, const analysis::AnalysisPlatform &platform) {
   std::vector<NamedOrder> orders = {{"present", workload}};
   const Result<analysis::TaskSet> task_set = analysis::compile(workload, platform);
   if (!task_set) return orders;
@@ -60,15 +58,6 @@ std::vector<NamedOrder> orders_to_try(const Workload &workload, const analysis::
   if (workload.policy != PolicyKind::DeadlineMonotonic) {
     orders.push_back({"deadline_monotonic", with_policy(workload, PolicyKind::DeadlineMonotonic)});
   }
-  if (platform.workers > 1) orders.push_back({"dkc", with_order(workload, *task_set, dkc_order(*task_set))});
-  const TestChoice choice = order_free_test(workload, platform);
-  if (!choice.test) return orders;
-  const Badness badness = [objective](Duration response, Duration due) {
-    const auto late = static_cast<double>(response - due);
-    return objective == Objective::Slack ? late / static_cast<double>(due) : late;
-  };
-  const auto found = audsley(workload, platform, *choice.test, badness, stop);
-  if (found) orders.push_back({"audsley", with_order(workload, *task_set, *found)});
   return orders;
 }
 

@@ -6,7 +6,6 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -29,16 +28,14 @@ struct Freedom {
 
 /// An order of priorities to try: the workload, apart from its max_active and workers.
 struct NamedOrder {
-  std::string name;  // "present", "rate_monotonic", "deadline_monotonic", "dkc", "audsley"
+  std::string name;  // "present", "rate_monotonic", "deadline_monotonic"
   Workload workload;
 };
 
-/// Returns the orders worth trying, the present one first: by rates, by deadlines, D - k L on several workers, and
-/// Audsley's. Only the present one where the policy has no static priorities and the workload is schedulable. Requires
-/// a valid workload. `stop` is asked before every test of Audsley's assignment, which is left out if it ends there.
+/// Returns the orders worth trying, the present one first: by rates, and by deadlines. Only the present one where the
+/// policy has no static priorities and the workload is schedulable. Requires a valid workload.
 [[nodiscard]] std::vector<NamedOrder> orders_to_try(const Workload &workload,
-                                                    const analysis::AnalysisPlatform &platform, Objective objective,
-                                                    const std::function<bool()> &stop = {});
+                                                    const analysis::AnalysisPlatform &platform);
 
 /// Maps points to settings. A point holds the workers, the position of the order, and the max_active of each DAG.
 class SettingSpace {

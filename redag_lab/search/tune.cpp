@@ -84,7 +84,7 @@ class Tuner {
   // Orders are the same for every number of workers.
   std::vector<NamedOrder> orders_of(const Workload &workload) const {
     if (!options_.freedom.priorities) return {{"present", workload}};
-    return orders_to_try(workload, platform_of(workload), options_.objective, [this] { return is_stopped(); });
+    return orders_to_try(workload, platform_of(workload));
   }
 
   [[nodiscard]] bool is_stopped() const {

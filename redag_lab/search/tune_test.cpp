@@ -252,23 +252,6 @@ TEST(TuneByBounds, ShortDeadlinesGoFirst) {
   EXPECT_EQ(tuned.best.workload.policy, PolicyKind::DeadlineMonotonic);
 }
 
-TEST(TuneByBounds, AudsleyBeatsDeadlinesLongerThanPeriods) {
-  // From J. Lehoczky, RTSS 1990: with D > T, neither rates nor deadlines decide. With (52, 100, D = 110) above (52,
-  // 140, D = 154), the second responds after 156. In the other order the responses are 108 and 52.
-  Workload workload = independent({{52, 100, 110}, {52, 140, 154}});
-  for (Dag &dag : workload.dags) {
-    dag.tasks[0].overrun = Overrun::Queue;
-    dag.tasks[0].queue_depth = 2;
-  }
-  const Tuned tuned = by_bounds(workload);
-  EXPECT_FALSE(tuned.present.score.proven);
-  EXPECT_EQ(order_of(tuned), "audsley");
-  EXPECT_TRUE(tuned.best.score.proven);
-  EXPECT_EQ(tuned.best.score.extremes.worst_lateness, -2);
-  EXPECT_EQ(tuned.best.workload.policy, PolicyKind::Fixed);
-  EXPECT_GT(tuned.best.workload.dags[1].tasks[0].priority, tuned.best.workload.dags[0].tasks[0].priority);
-}
-
 TEST(TuneByBounds, LeavesAloneWhatNothingImproves) {
   const Workload workload = independent({{1, 4}, {1, 8}});
   for (const Objective objective : {Objective::Misses, Objective::Lateness, Objective::Slack}) {

@@ -398,26 +398,6 @@ class TuneByBounds(Case):
             self.expect(redag(*command, file, "-o", same), 0, f"wrote {same}: the unchanged workload")
             self.assertEqual(same.read_text(), written)
 
-    def test_audsley(self):
-        # J. Lehoczky, RTSS 1990: deadlines beyond periods, where neither order by rates nor by deadlines works.
-        file = self.write("lehoczky.yaml", """\
-name: lehoczky
-platform: {workers: 1, preemption: os}
-dags:
-  - name: a
-    tasks: [{name: t, wcet: 52ms, period: 100ms, deadline: 110ms, overrun: {queue: 2}}]
-  - name: b
-    tasks: [{name: t, wcet: 52ms, period: 140ms, deadline: 154ms, overrun: {queue: 2}}]
-""")
-        tuned = self.folder / "tuned.yaml"
-        text = self.expect(redag(*BY_BOUNDS, file, "-o", tuned), 0).stdout
-        self.assertIn("change policy: rate_monotonic -> fixed", text)
-        self.assertIn("change priority of b.t: none -> 2", text)
-        self.assertRegex(text, r"1 +audsley +- +yes +none")
-        self.expect(redag("analyze", tuned, "--check"), 0)
-        run = json.loads(self.expect(redag("simulate", tuned, "--json", "--check"), 0).stdout)
-        self.assertTrue(run["check"]["ok"])
-
     def test_max_active(self):
         wide = "".join(f", {{name: f{i}, wcet: 40ms, activation: data, after: s}}" for i in range(4))
         file = self.write("wide.yaml", f"""\
