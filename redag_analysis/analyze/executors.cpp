@@ -6,12 +6,11 @@
 #include "redag_analysis/many_workers/dag_isolated.hpp"
 #include "redag_analysis/many_workers/global_dag.hpp"
 #include "redag_analysis/peers/wait_set.hpp"
-#include "redag_analysis/peers/wait_set_rates.hpp"
 
 namespace redag::analysis {
 
 const std::vector<Method> &executor_methods() {
-  static const std::vector<Method> kAll = {wait_set_rates(), wait_set(), casini()};
+  static const std::vector<Method> kAll = {wait_set()};
   return kAll;
 }
 

@@ -73,7 +73,8 @@ TEST(Bounds, OtherExecutorsHaveTheirOwnOrNone) {
   const RunBounds bounds = bounds_of(ste.info);
   ASSERT_EQ(bounds.tasks.size(), 2U) << bounds.absent;
   EXPECT_EQ(bounds.tasks[1].response, 22 * kMillisecond) << "h comes once while l waits; wait_set counts it twice";
-  EXPECT_EQ(bounds.tasks[1].method, "wait_set_rates");
+  EXPECT_EQ(bounds.tasks[1].method, "dag_any");
+  EXPECT_EQ(bounds.tasks[0].method, "wait_set");
   const RunBounds events = bounds_of(simulated(workload, kSecond, "events").info);
   ASSERT_EQ(events.tasks.size(), 2U) << events.absent;
   EXPECT_EQ(events.tasks[1].response, 22 * kMillisecond);
