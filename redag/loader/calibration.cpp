@@ -70,9 +70,9 @@ class OverheadsReader : private yaml::ValueReader {
   void read_provenance() {
     const Node *node = find(root_, "provenance");
     if (node == nullptr) return;
-    if (!check_map(*node, "provenance",
-                   {"date", "host", "kernel", "processor", "processors", "rights", "load", "duration", "complete",
-                    "version"})) {
+    if (!check_map(
+            *node, "provenance",
+            {"date", "host", "kernel", "processor", "processors", "rights", "duration", "complete", "version"})) {
       return;
     }
     const auto take_text = [&](const char *key, std::string &out) {
@@ -85,7 +85,6 @@ class OverheadsReader : private yaml::ValueReader {
     take_text("kernel", calibration_.kernel);
     take_text("processor", calibration_.processor);
     take_text("rights", calibration_.rights);
-    take_text("load", calibration_.load);
     take_text("version", calibration_.version);
     if (const Node *value = find(*node, "processors")) {
       if (const auto read = integer<std::uint32_t>(*value, "processors", 0)) calibration_.processors = *read;
@@ -126,7 +125,6 @@ void write(Writer &out, const Measured &row) {
   out.begin_map(Writer::Layout::OneLine);
   out.write("what", row.what);
   out.write("threads", row.threads);
-  out.write("load", row.load);
   out.write("samples", row.samples);
   out.write("p50", format_duration(row.p50));
   out.write("p99", format_duration(row.p99));
@@ -140,7 +138,6 @@ void write(Writer &out, const Measured &row) {
 std::string Calibration::provenance() const {
   std::string text = fmt::format("calibrated {} on {}", date.empty() ? "on an unknown day" : date,
                                  host.empty() ? "an unknown host" : host);
-  if (!load.empty()) text += ", " + load;
   if (duration > 0) text += ", " + humanize_duration(duration);
   return text + (complete ? "" : ", partial: ended early");
 }
@@ -171,7 +168,6 @@ std::string to_yaml(const Calibration &calibration) {
   write_quoted(out, "processor", calibration.processor);
   out.write("processors", calibration.processors);
   write_quoted(out, "rights", calibration.rights);
-  write_quoted(out, "load", calibration.load);
   out.write("duration", format_duration(calibration.duration));
   out.write("complete", calibration.complete ? "true" : "false");
   write_quoted(out, "version", calibration.version);

@@ -21,7 +21,6 @@ namespace redag {
 struct Measured {
   std::string what;     // "dispatch"
   std::string threads;  // "realtime", "normal"
-  std::string load;     // "idle", "loaded"
   std::uint64_t samples = 0;
   Duration p50 = 0;
   Duration p99 = 0;
@@ -40,14 +39,13 @@ struct Calibration {
   std::string kernel;
   std::string processor;
   std::string rights;  // "SCHED_FIFO up to 98", "none"
-  std::string load;    // "idle", "idle and loaded"
   std::string version;
   Duration duration = 0;
   std::uint32_t processors = 0;
   bool complete = true;  // false: ended early, with the maxima until then
   std::vector<Measured> measured;
 
-  /// For example "overheads of 2026-11-23T08:30:00Z on host (idle and loaded, 30s)".
+  /// For example "overheads of 2026-11-23T08:30:00Z on host (30s)".
   [[nodiscard]] std::string provenance() const;
   /// Returns the overheads charged to jobs on such threads. Error: they were not measured.
   [[nodiscard]] Result<Overheads> of(bool realtime_threads) const;

@@ -30,7 +30,6 @@ Calibration calibration() {
   all.kernel = "Linux 6.1";
   all.processor = "an old one";
   all.rights = "SCHED_FIFO up to 98";
-  all.load = "idle and loaded";
   all.version = "0.1.0";
   all.duration = 30 * kSecond;
   all.processors = 4;
@@ -70,14 +69,14 @@ TEST(Calibration, FileIsReadBack) {
   all.complete = false;
   all.realtime.reset();
   EXPECT_EQ(parse_calibration(to_yaml(all), "o.yaml").value(), all);
-  all.measured.push_back({"dispatch", "normal", "idle", 100, 1, 2, 3, 4});
+  all.measured.push_back({"dispatch", "normal", 100, 1, 2, 3, 4});
   EXPECT_THAT(to_yaml(all), HasSubstr("samples: 100"));
   EXPECT_TRUE(parse_calibration(to_yaml(all), "o.yaml")->measured.empty()) << "for people";
 }
 
 TEST(Calibration, SaysWhereItComesFrom) {
   Calibration all = calibration();
-  EXPECT_EQ(all.provenance(), "calibrated 2026-11-23T08:30:00Z on robot: \"the second\", idle and loaded, 30s");
+  EXPECT_EQ(all.provenance(), "calibrated 2026-11-23T08:30:00Z on robot: \"the second\", 30s");
   all.complete = false;
   EXPECT_THAT(all.provenance(), HasSubstr("partial"));
 }

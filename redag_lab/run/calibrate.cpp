@@ -26,7 +26,6 @@
 #include "redag/threads/setup.hpp"
 #include "redag/threads/threads.hpp"
 #include "redag/trace/trace.hpp"
-#include "redag_lab/run/machine_load.hpp"
 #include "redag_lab/run/run_workload.hpp"
 
 namespace redag::lab {
@@ -276,7 +275,6 @@ class Calibrating {
 
   Result<Calibration> run() {
     workload_ = calibration_workload(static_cast<std::uint32_t>(cpus_.size()));
-    result_.load = options_.loaded ? "idle and loaded" : "idle";
     note("thread_clock", "any", clock_costs());
     const Time begun = runtime::monotonic_now();
     if (Result<void> done = measure(); !done) return tl::unexpected(done.error());
@@ -287,7 +285,6 @@ class Calibrating {
  private:
   struct Slice {
     bool realtime = false;
-    bool loaded = false;
     bool stalls = false;
   };
 
@@ -296,13 +293,10 @@ class Calibrating {
   // Measures all slices in turn, several times over: what changes during the measurement concerns them all.
   Result<void> measure() {
     std::vector<Slice> slices;
-    for (const bool loaded : {false, true}) {
-      if (loaded && !options_.loaded) continue;
-      for (const bool realtime : {true, false}) {
-        if (realtime && band_.top_job == 0) continue;
-        slices.push_back({realtime, loaded, false});
-        slices.push_back({realtime, loaded, true});
-      }
+    for (const bool realtime : {true, false}) {
+      if (realtime && band_.top_job == 0) continue;
+      slices.push_back({realtime, false});
+      slices.push_back({realtime, true});
     }
     const auto count = static_cast<Duration>(slices.size());
     constexpr Duration kRounds = 4;
@@ -314,10 +308,6 @@ class Calibrating {
       if (options_.progress) {
         options_.progress(static_cast<double>(done) / static_cast<double>(turns * count),
                           slice.stalls ? "stalls" : "dispatch, preemption, timer");
-      }
-      MachineLoad load;
-      if (slice.loaded) {
-        if (Result<void> started = load.start(cpus_.size()); !started) return started;
       }
       const Result<void> measured = slice.stalls ? watch_for_stalls(slice, length) : run_jobs(slice, length);
       if (!measured) return measured;
@@ -419,7 +409,7 @@ class Calibrating {
     const auto at = [&](double share) {
       return values[std::min(values.size() - 1, static_cast<std::size_t>(share * static_cast<double>(values.size())))];
     };
-    result_.measured.push_back({what, threads, result_.load, values.size(), at(0.5), at(0.99), at(0.999), at(1)});
+    result_.measured.push_back({what, threads, values.size(), at(0.5), at(0.99), at(0.999), at(1)});
   }
 
   const CalibrateOptions &options_;

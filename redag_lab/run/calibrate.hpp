@@ -22,7 +22,6 @@ namespace redag::lab {
 
 struct CalibrateOptions {
   Duration duration = 30 * kSecond;
-  bool loaded = false;                      // half of the time with threads that keep the machine busy
   const std::atomic<bool> *stop = nullptr;  // ends the measurement early
   /// Called between measurements, at least every few seconds, with the share that is done and the next measurement's
   /// name.

@@ -24,7 +24,6 @@ constexpr Duration kLongest = kSecond * 3600 * 24;
 
 struct CalibrateOptions {
   Duration duration = 30 * kSecond;
-  bool loaded = false;
   std::string out = "overheads.yaml";
 };
 
@@ -59,7 +58,6 @@ Result<Calibration> measure(const CalibrateOptions &options, Console &console) {
   progress.set_label("calibrate");
   lab::CalibrateOptions run;
   run.duration = options.duration;
-  run.loaded = options.loaded;
   run.stop = &InterruptGuard::flag();
   run.progress = [&](double done, const char *next) {
     const Duration left = std::max<Duration>(0, options.duration - progress.elapsed());
@@ -105,7 +103,6 @@ int calibrate(const CalibrateOptions &options, Console &console) {
 Action add_calibrate(CLI::App &app) {
   auto options = std::make_shared<CalibrateOptions>();
   add_duration(app, "--duration", options->duration, "Total time to measure")->default_str("30s");
-  app.add_flag("--loaded", options->loaded, "Keep the machine busy with other threads for half of the time");
   app.add_option("--out", options->out, "File for the measured overheads")->type_name("FILE")->capture_default_str();
   return [options](Console &console) { return calibrate(*options, console); };
 }

@@ -50,7 +50,7 @@ constexpr std::array kCommands = {
           "  redag run workloads/robot.yaml --executor ste --check || echo 'missed'\n"},
     Entry{"calibrate", "Measure the overheads of this machine, for bounds that hold on it", add_calibrate,
           "  redag calibrate\n"
-          "  sudo redag calibrate --duration 5min --loaded --out overheads.yaml\n"
+          "  sudo redag calibrate --duration 5min --out overheads.yaml\n"
           "  redag calibrate --duration 5s\n"},
     Entry{"compare", "Compare several executors on the same jobs, or two recorded results", add_compare,
           "  redag compare workloads/robot.yaml\n"
