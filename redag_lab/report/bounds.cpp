@@ -7,10 +7,8 @@
 
 #include <algorithm>
 
-#include "redag/model/clusters.hpp"
-#include "redag_analysis/analyze/analyze.hpp"
-#include "redag_analysis/analyze/executors.hpp"
 #include "redag_analysis/metrics/assumptions.hpp"
+#include "redag_lab/search/analysed.hpp"
 
 namespace redag::report {
 namespace {
@@ -49,35 +47,29 @@ void take(const std::vector<analysis::Tightest> &all, const std::vector<Id> &ids
 }  // namespace
 
 RunBounds bounds_of(const trace::RunInfo &run) {
-  const executors::ExecutorKind *executor = executors::find_executor(run.executor);
-  if (executor == nullptr) return none("there is no analysis for the executor '" + run.executor + "'");
   if (run.workload.task_count() > kMostTasks) {
     return none(fmt::format("there are more than {} tasks, which takes long: run 'redag analyze' for their bounds",
                             kMostTasks));
   }
   const auto executed = analysis::as_executed(run.workload, run.config, run.overheads);
   if (!executed) return none(executed.error().front().message);
+  const auto parts = lab::analyse_parts(executed->workload, executed->platform, run.executor);
+  if (!parts) return none(parts.error().front().message);
   RunBounds bounds;
   bounds.assumes = describe(executed->platform, run);
   bounds.tasks.resize(run.workload.task_count());
   bounds.dags.resize(run.workload.dags.size());
-  bounds.schedulable = true;
+  bounds.schedulable = lab::is_schedulable(*parts);
   std::string not_analysable;
-  for (const ClusterPart &part : parts_of(executed->workload)) {
-    if (part.dags.empty()) continue;
-    const auto task_set =
-        analysis::compile_for(*executor, part.workload, analysis::platform_of(executed->platform, part));
-    if (!task_set) return none(task_set.error().front().message);
-    const analysis::Report report = analysis::analyze(*task_set, analysis::methods_of(*executor));
-    take(report.tasks, part.tasks, bounds.tasks);
-    take(report.dags, part.dags, bounds.dags);
-    bounds.schedulable = bounds.schedulable && report.verdict == analysis::Verdict::Schedulable;
-    for (const analysis::Method *method : report.by) {
+  for (const auto &[part, analysed] : *parts) {
+    take(analysed.report.tasks, part.tasks, bounds.tasks);
+    take(analysed.report.dags, part.dags, bounds.dags);
+    for (const analysis::Method *method : analysed.report.by) {
       if (std::find(bounds.by.begin(), bounds.by.end(), method->name) == bounds.by.end()) {
         bounds.by.emplace_back(method->name);
       }
     }
-    if (not_analysable.empty()) not_analysable = task_set->not_analysable;
+    if (not_analysable.empty()) not_analysable = analysed.task_set.not_analysable;
   }
   const auto bounded = [](const BoundOf &bound) { return bound.response.has_value(); };
   if (!bounds.schedulable && std::none_of(bounds.tasks.begin(), bounds.tasks.end(), bounded)) {

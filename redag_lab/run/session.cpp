@@ -11,14 +11,11 @@
 #include <memory>
 #include <span>
 
-#include "redag/model/clusters.hpp"
 #include "redag/model/modes.hpp"
-#include "redag/sched/cluster_config.hpp"
 #include "redag/threads/threads.hpp"
-#include "redag_analysis/analyze/analyze.hpp"
-#include "redag_analysis/analyze/executors.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/check/trace_checker.hpp"
+#include "redag_lab/report/bounds.hpp"
 #include "redag_lab/run/run_workload.hpp"
 
 namespace redag::lab {
@@ -210,18 +207,12 @@ std::vector<Duration> bounds_of(const Workload &workload, const Variant &variant
   constexpr std::size_t kMostTasks = 100;
   std::vector<Duration> bounds(workload.task_count(), 0);
   if (bounds.size() > kMostTasks) return bounds;
-  Workload configured = workload;
-  for (Dag &dag : configured.dags) inherit_periods(dag);
-  const executors::ExecutorKind &executor = *executors::find_executor(variant.executor);
-  for (const ClusterPart &part : parts_of(configured)) {
-    const analysis::AnalysisPlatform platform = analysis::platform_of(sched::config_of(config, part));
-    const Result<analysis::TaskSet> task_set = analysis::compile_for(executor, part.workload, platform);
-    if (!task_set || !task_set->not_analysable.empty()) continue;
-    const analysis::Report report = analysis::analyze(*task_set, analysis::methods_of(executor));
-    for (std::size_t t = 0; t < part.tasks.size(); ++t) {
-      bounds[part.tasks[t].value] = report.tasks[t].response.value_or(0);
-    }
-  }
+  trace::RunInfo run;
+  run.workload = workload;
+  run.executor = variant.executor;
+  run.config = config;
+  const report::RunBounds found = report::bounds_of(run);
+  for (std::size_t t = 0; t < found.tasks.size(); ++t) bounds[t] = found.tasks[t].response.value_or(0);
   return bounds;
 }
 
