@@ -98,8 +98,7 @@ Result<RunDigest> GroupReader::read(const std::string &path, const trace::Record
 }
 
 Result<void> GroupReader::explain(const trace::Recording &run) {
-  const Result<metrics::Investigation> investigation =
-      metrics::Investigation::of(run, std::nullopt, options_.most_explained);
+  const Result<metrics::Investigation> investigation = metrics::Investigation::of(run, options_.most_explained);
   if (!investigation) return tl::unexpected<Diagnostics>(investigation.error());
   Result<WhyDigest> why = why_of(*investigation, options_.most_views);
   if (!why) return tl::unexpected<Diagnostics>(std::move(why.error()));

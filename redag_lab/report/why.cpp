@@ -82,7 +82,7 @@ Result<WhyDigest> why_of(const metrics::Investigation &investigation, std::size_
     causes.add(one);
     if (rank < why.worst.size()) why.worst[rank] = std::move(one);
   };
-  const Result<std::uint64_t> explained = investigation.explain(subjects, take);
+  const Result<void> explained = investigation.explain(subjects, take);
   if (!explained) return tl::unexpected<Diagnostics>(explained.error());
   why.causes = causes.sorted();
   const Result<std::vector<metrics::Explanation>> firsts =

@@ -2,7 +2,7 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Tests `redag why`: its screens and JSON, mistakes, and the kernel's record beside a run on threads.
+"""Tests `redag why`: its screens and JSON, and mistakes.
 
 Usage: why.py PROGRAM SOURCE_DIR. Uses the standard library only.
 """
@@ -11,14 +11,6 @@ import re
 import sys
 
 from program import CART, SOURCE, Case, in_terminal, main, redag
-
-PID = """\
-name: pid
-platform: {workers: 1, preemption: none}
-dags:
-  - name: control
-    tasks: [{name: pid, wcet: 1ms, period: 10ms, deadline: 5ms}]
-"""
 
 
 class Why(Case):
@@ -97,7 +89,6 @@ class Why(Case):
         self.expect(redag("why", folder, "control.contoller"), 2, "did you mean 'control.controller'?")
         self.expect(redag("why", folder, "control.controller#9999"), 2, "its jobs are 0 to")
         self.expect(redag("why", folder, "control.controller#x"), 2, "has no job 'x'")
-        self.expect(redag("why", folder, "--kernel", self.cart), 2, "does not say when it was")
         for command in ("why", "events", "report"):
             self.expect(redag(command, self.cart), 2, "this is a workload, and not a recorded run", "redag simulate")
 
@@ -118,33 +109,6 @@ class Why(Case):
         self.expect(redag("why", many / "mte"), 0, "holds 4 runs; this is ")
         (many / "comparison.json").unlink()
         self.expect(redag("why", many), 2, "holds 8 runs", f"name one of them, such as '{many / 'mte'}")
-
-    def test_the_kernels_record_names_the_other_program(self):
-        """The text is as trace-cmd would have written it, had the hog taken the middle of a job."""
-        folder, record = self.folder / "result", self.folder / "kernel.txt"
-        self.expect(redag("run", self.write("pid.yaml", PID), "--duration", "300ms", "--out", folder), 0)
-        events = self.expect(redag("events", folder), 0).stdout
-        origin = json.loads(events.split("\n", 1)[0])["run"]["origin_ns"]
-        job = next(row for row in self.jobs(folder) if row["finish_ns"])  # on a busy machine the first ones can be skipped
-        start, finish = int(job["start_ns"]), int(job["finish_ns"])
-        third = (finish - start) // 3
-        switches = [(start - 20_000, "swapper/0:0 [120] R", "redag-0:77 [120]"),
-                    (start + third, "redag-0:77 [120] R", "the-hog:99 [9]"),
-                    (finish - third, "the-hog:99 [9] S", "redag-0:77 [120]"),
-                    (finish + 20_000, "redag-0:77 [120] S", "swapper/0:0 [120]")]
-        lines = [f"  x-1  [000]  {(origin + at) // 10**9}.{(origin + at) % 10**9:09}: sched_switch:  {a} ==> {b}\n"
-                 for at, a, b in switches]
-        record.write_text("".join(lines))
-        why = ["why", folder, f"control.pid#{job['job']}", "--json", "--kernel", record]
-        document = self.document(redag(*why), "redag.why/1")
-        parts = document["jobs"][0]["parts"]
-        self.assertEqual(sum(part["length_ns"] for part in parts), document["jobs"][0]["length_ns"])
-        hog = [part for part in parts if part["program"] == "the-hog-99"]
-        self.assertEqual([part["cause"] for part in hog], ["other_program"], parts)
-        self.assertAlmostEqual(hog[0]["length_ns"], third, delta=2)
-        record.write_text("nonsense\n")
-        self.expect(redag(*why), 2, "has no event of the time of this run", "trace-cmd record -C mono")
-        self.expect(redag(*why[:-1], self.folder / "none"), 2, "none")
 
 
 if __name__ == "__main__":

@@ -19,8 +19,6 @@ void robot_target(std::string_view input);
 void plan_target(std::string_view input);
 /// Reads events.redag, and makes everything that is made of a trace: checks, summary, jobs.csv, Perfetto, report.
 void events_target(std::string_view input);
-/// Reads the text of a kernel's record, and follows threads in it.
-void kernel_record_target(std::string_view input);
 /// Reads comparison.json beside recorded runs.
 void comparison_target(std::string_view input);
 /// Reads units.csv of an experiment.
@@ -40,16 +38,9 @@ struct Target {
 };
 
 inline constexpr std::array kTargets = {
-    Target{"workload", workload_target},
-    Target{"plan", plan_target},
-    Target{"events", events_target},
-    Target{"comparison", comparison_target},
-    Target{"units", units_target},
-    Target{"live_page", live_page_target},
-    Target{"values", values_target},
-    Target{"commands", commands_target},
-    Target{"kernel_record", kernel_record_target},
-    Target{"robot", robot_target},
+    Target{"workload", workload_target},     Target{"plan", plan_target},         Target{"events", events_target},
+    Target{"comparison", comparison_target}, Target{"units", units_target},       Target{"live_page", live_page_target},
+    Target{"values", values_target},         Target{"commands", commands_target}, Target{"robot", robot_target},
     Target{"order_page", order_page_target},
 };
 

@@ -56,14 +56,13 @@ class WaitingSubjects {
   std::vector<std::pair<JobHandle, std::size_t>> waiting_;
 };
 
-using CulpritKey = std::tuple<Cause, TaskId, std::string>;
+using CulpritKey = std::pair<Cause, TaskId>;
 
 CulpritKey culprit_key(const Part &part) {
   // What a predecessor's job did itself is charged to it.
   const bool is_own = part.cause == Cause::Execution || part.cause == Cause::Overrun || part.cause == Cause::Overhead ||
-                      part.cause == Cause::OffProcessor || part.cause == Cause::OnWorker ||
-                      part.cause == Cause::Slept || part.cause == Cause::Wakeup;
-  return {part.cause, is_own ? part.job.task : part.by.task, part.program};
+                      part.cause == Cause::OffProcessor || part.cause == Cause::OnWorker || part.cause == Cause::Wakeup;
+  return {part.cause, is_own ? part.job.task : part.by.task};
 }
 
 // Why a job was lost; Unknown: nothing more than where its time went.
@@ -207,15 +206,8 @@ class Investigation::Explainer {
   Explainer(const Investigation &of, std::span<const Subject> subjects, const Visit &visit)
       : of_(of), subjects_(subjects), visit_(visit) {}
 
-  Result<std::uint64_t> run() {
-    if (of_.kernel_) {
-      Result<KernelReader> reader = of_.kernel_->read();
-      if (!reader) return tl::unexpected<Diagnostics>(std::move(reader.error()));
-      kernel_.emplace(*std::move(reader));
-    }
-    if (Result<void> chosen = choose(); !chosen) return tl::unexpected<Diagnostics>(std::move(chosen.error()));
-    if (Result<void> followed = follow(); !followed) return tl::unexpected<Diagnostics>(std::move(followed.error()));
-    return kernel_ ? kernel_->lost() : 0;
+  Result<void> run() {
+    return choose().and_then([this] { return follow(); });
   }
 
  private:
@@ -256,24 +248,13 @@ class Investigation::Explainer {
             visit_(index, explain(*subject, subjects_[index].end_to_end, links));
           });
     };
-    Result<void> kernel;
-    const auto read_kernel = [&](Time time) {
-      if (kernel_ && kernel) kernel = kernel_->read_until(time);
-    };
     Result<void> read = of_.run_.visit([&](std::span<const JobEvent> events) {
       for (const JobEvent &event : events) watch.add(event, links);
-      if (!events.empty()) read_kernel(events.back().time);
       settle();
     });
-    read_kernel(of_.run().end);
     watch.finish(links);
     settle();
-    if (kernel_ && kernel && !kernel_->covers(of_.run().start, of_.run().end)) {
-      return make_error(fmt::format("{} has no event of the time of this run", of_.kernel_->path()),
-                        "record it during the run with 'trace-cmd record -C mono -e sched:sched_switch -e irq', and "
-                        "write it with 'trace-cmd report'");
-    }
-    return read ? kernel : read;
+    return read;
   }
 
   [[nodiscard]] Explanation explain(const LinkedJob &job, bool end_to_end, const JobLinks &links) const {
@@ -284,8 +265,7 @@ class Investigation::Explainer {
     one.begin = one.end_to_end ? job.record.origin : job.record.release;
     one.end = std::max(one.begin, links.end_of(job));
     one.deadline = one.end_to_end ? of_.end_to_end_[job.record.task.value] : job.record.deadline - job.record.release;
-    one.parts =
-        WhyPath(of_.run(), links, kernel_ ? &*kernel_ : nullptr).parts_of(job, one.begin, one.end, one.end_to_end);
+    one.parts = WhyPath(of_.run(), links).parts_of(job, one.begin, one.end, one.end_to_end);
     return one;
   }
 
@@ -293,15 +273,13 @@ class Investigation::Explainer {
   std::span<const Subject> subjects_;
   const Visit &visit_;
   std::unordered_set<std::uint64_t> chosen_;
-  std::optional<KernelView> kernel_;
 };
 
-Investigation::Investigation(const trace::Recording &run, const std::optional<KernelRecord> &kernel)
-    : run_(run), end_to_end_(end_to_end_deadlines(run.info().workload)), kernel_(kernel) {}
+Investigation::Investigation(const trace::Recording &run)
+    : run_(run), end_to_end_(end_to_end_deadlines(run.info().workload)) {}
 
-Result<Investigation> Investigation::of(const trace::Recording &run, const std::optional<KernelRecord> &kernel,
-                                        std::size_t most) {
-  Investigation made(run, kernel);
+Result<Investigation> Investigation::of(const trace::Recording &run, std::size_t most) {
+  Investigation made(run);
   Surveyor surveyor(made, most);
   const Result<void> read = run.visit([&](std::span<const JobEvent> events) { surveyor.add(events); });
   if (!read) return tl::unexpected<Diagnostics>(read.error());
@@ -352,14 +330,13 @@ Result<std::optional<Subject>> Investigation::find(const JobId &job) const {
   return found;
 }
 
-Result<std::uint64_t> Investigation::explain(std::span<const Subject> subjects, const Visit &visit) const {
+Result<void> Investigation::explain(std::span<const Subject> subjects, const Visit &visit) const {
   return Explainer(*this, subjects, visit).run();
 }
 
 Result<std::vector<Explanation>> Investigation::explain(std::span<const Subject> subjects) const {
   std::vector<Explanation> all(subjects.size());
-  const Result<std::uint64_t> read =
-      explain(subjects, [&](std::size_t index, Explanation one) { all[index] = std::move(one); });
+  const Result<void> read = explain(subjects, [&](std::size_t index, Explanation one) { all[index] = std::move(one); });
   if (!read) return tl::unexpected<Diagnostics>(read.error());
   return all;
 }
@@ -398,7 +375,7 @@ std::vector<Culprit> culprits_of(std::span<const Part> parts) {
   for (const Part &part : parts) {
     const CulpritKey key = culprit_key(part);
     Culprit &culprit = found[key];
-    std::tie(culprit.cause, culprit.task, culprit.program) = key;
+    std::tie(culprit.cause, culprit.task) = key;
     culprit.jobs = 1;
     culprit.time += part.length;
   }
@@ -440,8 +417,8 @@ std::optional<MainCause> main_cause_of(std::span<const Culprit> culprits) {
 
 void CulpritCount::add(const Explanation &explanation) {
   for (const Culprit &one : culprits_of(explanation)) {
-    Culprit &culprit = found_[{one.cause, one.task, one.program}];
-    std::tie(culprit.cause, culprit.task, culprit.program) = std::tie(one.cause, one.task, one.program);
+    Culprit &culprit = found_[{one.cause, one.task}];
+    std::tie(culprit.cause, culprit.task) = std::tie(one.cause, one.task);
     culprit.jobs += one.jobs;
     culprit.main += one.main;
     culprit.time += one.time;

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Explains where the time of a job went, from its release to its end, or end to end: backwards along the data that it
-// waited for. The parts of an explanation sum exactly to that time. A part has a cause only where the trace, or the
-// kernel's record of the run, shows it; other time is called unknown. why_text.hpp has the words. Reads the run's
+// waited for. The parts of an explanation sum exactly to that time. A part has a cause only where the trace
+// shows it; other time is called unknown. why_text.hpp has the words. Reads the run's
 // events several times; memory grows with the jobs to explain, and not with the run. Not thread-safe.
 #pragma once
 
@@ -14,17 +14,14 @@
 #include <map>
 #include <optional>
 #include <span>
-#include <string>
-#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "redag/base/result.hpp"
 #include "redag/trace/recording.hpp"
 #include "redag_analysis/metrics/jobs.hpp"
 #include "redag_analysis/metrics/miss.hpp"
-#include "redag_analysis/metrics/why/kernel_record.hpp"
 #include "redag_analysis/metrics/why/why_cause.hpp"
-#include "redag_analysis/metrics/why/why_kernel.hpp"
 
 namespace redag::metrics {
 
@@ -52,7 +49,6 @@ struct Explanation {
 struct Culprit {
   Cause cause = Cause::Unknown;
   TaskId task;           // invalid: no job caused it
-  std::string program;   // as Part::program
   std::size_t jobs = 0;  // explained jobs that it delayed
   std::size_t main = 0;  // of these, jobs that it delayed most
   Duration time = 0;     // in all of them
@@ -82,9 +78,8 @@ class Investigation {
   using Visit = std::function<void(std::size_t, Explanation)>;
 
   /// Reads the run once. Keeps up to `most` of its misses, the worst ones. What `run` refers to must outlive the
-  /// result. `kernel` is what the kernel recorded meanwhile. Error: a damaged file.
+  /// result. Error: a damaged file.
   [[nodiscard]] static Result<Investigation> of(const trace::Recording &run,
-                                                const std::optional<KernelRecord> &kernel = std::nullopt,
                                                 std::size_t most = std::numeric_limits<std::size_t>::max());
 
   [[nodiscard]] const trace::RunInfo &run() const { return run_.info(); }
@@ -108,9 +103,8 @@ class Investigation {
   /// The largest number of a job of the task.
   [[nodiscard]] std::uint32_t last_number(TaskId task) const { return survey_.tasks[task.value].last_number; }
 
-  /// Explains jobs, each named once, in two passes. They come in order of their end. Returns how many of its events the
-  /// kernel dropped, so that explanations can be wrong. Error: a damaged file.
-  [[nodiscard]] Result<std::uint64_t> explain(std::span<const Subject> subjects, const Visit &visit) const;
+  /// Explains jobs, each named once, in two passes. They come in order of their end. Error: a damaged file.
+  [[nodiscard]] Result<void> explain(std::span<const Subject> subjects, const Visit &visit) const;
   /// The same, in the order of `subjects`.
   [[nodiscard]] Result<std::vector<Explanation>> explain(std::span<const Subject> subjects) const;
 
@@ -136,17 +130,16 @@ class Investigation {
   class Surveyor;
   class Explainer;
 
-  Investigation(const trace::Recording &run, const std::optional<KernelRecord> &kernel);
+  explicit Investigation(const trace::Recording &run);
   static bool is_worse(const Ranked &a, const Ranked &b);
   [[nodiscard]] Miss miss_of(const JobRecord &job) const;
 
   trace::Recording run_;
   std::vector<Duration> end_to_end_;  // by TaskId: the deadline; 0: none
-  std::optional<KernelRecord> kernel_;
   Survey survey_;
 };
 
-/// The culprits of one job's parts: parts of one cause and one task or program together, the largest first. Work
+/// The culprits of one job's parts: parts of one cause and one task together, the largest first. Work
 /// (is_work()) comes last.
 [[nodiscard]] std::vector<Culprit> culprits_of(std::span<const Part> parts);
 
@@ -171,7 +164,7 @@ class CulpritCount {
   [[nodiscard]] std::vector<Culprit> sorted() const;
 
  private:
-  std::map<std::tuple<Cause, TaskId, std::string>, Culprit> found_;
+  std::map<std::pair<Cause, TaskId>, Culprit> found_;
 };
 
 }  // namespace redag::metrics

@@ -28,11 +28,6 @@ const char *to_string(Cause cause) {
     case Cause::Waited: return "waited";
     case Cause::OffProcessor: return "off_processor";
     case Cause::OnWorker: return "on_worker";
-    case Cause::OtherProgram: return "other_program";
-    case Cause::OwnThread: return "own_thread";
-    case Cause::Interrupt: return "interrupt";
-    case Cause::Throttled: return "throttled";
-    case Cause::Slept: return "slept";
     case Cause::Threw: return "threw";
     case Cause::BudgetUsed: return "budget_used";
     case Cause::QueueFull: return "queue_full";

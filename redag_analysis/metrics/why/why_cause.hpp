@@ -5,7 +5,6 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
 
 #include "redag/base/ids.hpp"
 #include "redag/base/time.hpp"
@@ -37,12 +36,6 @@ enum class Cause : std::uint8_t {
   Waited,        // a device served it, or it waited for something else without a worker
   OffProcessor,  // it had a worker and did not execute; the record does not show why
   OnWorker,      // it had a worker; the record does not show whether it executed
-  // With the kernel's record
-  OtherProgram,  // another program had the processor
-  OwnThread,     // another thread of its own process had it
-  Interrupt,     // the kernel served an interrupt there
-  Throttled,     // its thread is a real-time one, and the kernel gave the processor to an ordinary one
-  Slept,         // its body waited in the kernel
   // Lost for a reason that is not where its time went
   Threw,        // its body threw
   BudgetUsed,   // it was cut off at its budget, or skipped because an earlier job had used it
@@ -66,10 +59,9 @@ struct JobId {
 /// A stretch of time and its cause.
 struct Part {
   Cause cause = Cause::Unknown;
-  JobId job;            // that did not end: the explained job, or one whose data it waited for
-  JobId by;             // the job that caused it; invalid: none
-  std::string program;  // the thread or interrupt that caused it, of causes that the kernel recorded
-  Time begin = 0;       // kNever: only the length is known
+  JobId job;       // that did not end: the explained job, or one whose data it waited for
+  JobId by;        // the job that caused it; invalid: none
+  Time begin = 0;  // kNever: only the length is known
   Duration length = 0;
 
   friend bool operator==(const Part &, const Part &) = default;

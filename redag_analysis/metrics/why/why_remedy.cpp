@@ -81,18 +81,9 @@ std::string advice(Cause cause, const Setting &at) {
     case Cause::Waited: return "shorten the wait, or lengthen the deadline";
     case Cause::OffProcessor:
     case Cause::Unknown:
-      return "give redag why the kernel's record with --kernel, which names other programs, interrupts and waits of "
-             "the "
-             "body";
+      return "see which other program or wait took the processor: perf sched record -k CLOCK_MONOTONIC, or trace-cmd";
     case Cause::OnWorker:
-      return fmt::format("shorten {}, or give redag why the kernel's record with --kernel to see what it did", x);
-    case Cause::OtherProgram:
-      return fmt::format("keep {} off the processors of the workers (isolated processors, cpusets, taskset)", x);
-    case Cause::OwnThread: return fmt::format("give {} another processor or a lower priority than the workers", x);
-    case Cause::Interrupt:
-      return fmt::format("serve {} on another processor (/proc/irq/*/smp_affinity), or isolate the processor", x);
-    case Cause::Throttled: return "use less real-time work, or raise /proc/sys/kernel/sched_rt_runtime_us";
-    case Cause::Slept: return fmt::format("take the wait out of {}, or declare it in its segments", x);
+      return fmt::format("shorten {}, or see what it did: perf sched record -k CLOCK_MONOTONIC, or trace-cmd", x);
     case Cause::Threw: return fmt::format("mend the exception in {}", x);
     case Cause::BudgetUsed:
       return fmt::format("raise the budget of {}{}, or shorten {}", x, now(at.budget), at.is_several ? "them" : "it");
@@ -113,7 +104,7 @@ Setting setting_of(const MainCause &main, const trace::RunInfo &run) {
   const Culprit &first = main.culprits.front();
   Setting at;
   at.is_several = main.culprits.size() > 1;
-  at.x = !at.is_several ? name_of(first, run.workload) : first.task.valid() ? "these callbacks" : "these threads";
+  at.x = !at.is_several ? name_of(first, run.workload) : "these callbacks";
   at.is_simulated = run.driver == trace::Driver::Simulator;
   at.preemption = run.preemption;
   const executors::ExecutorKind *kind = executors::find_executor(run.executor);

@@ -107,8 +107,7 @@ Explanation delayed_by(std::uint32_t task, Duration time) {
   one.job.task = TaskId(0);
   one.job.outcome = JobOutcome::Finished;
   one.end = time;
-  one.parts.push_back(
-      {.cause = Cause::Queued, .job = {TaskId(0), 0}, .by = {TaskId(task), 0}, .program = {}, .length = time});
+  one.parts.push_back({.cause = Cause::Queued, .job = {TaskId(0), 0}, .by = {TaskId(task), 0}, .length = time});
   return one;
 }
 

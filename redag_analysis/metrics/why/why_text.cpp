@@ -25,7 +25,7 @@ const Task *task_of(const Workload &workload, TaskId task) {
 }
 
 // `by` is the culprit with its rate, `own` the job that did not end, with its name only if it is not the explained one.
-std::string words(Cause cause, const std::string &by, const std::string &program) {
+std::string words(Cause cause, const std::string &by) {
   switch (cause) {
     case Cause::ReleaseLate: return "its timer fired late";
     case Cause::HandOver: return "the executor had not passed its data on yet";
@@ -49,11 +49,6 @@ std::string words(Cause cause, const std::string &by, const std::string &program
     case Cause::Waited: return "waited without a worker, as the workload says";
     case Cause::OffProcessor: return "stood still: its body waited, or another program ran";
     case Cause::OnWorker: return "had a worker; its processor time is not known";
-    case Cause::OtherProgram: return fmt::format("another program had the processor: {}", program);
-    case Cause::OwnThread: return fmt::format("another thread of this program had the processor: {}", program);
-    case Cause::Interrupt: return fmt::format("the kernel served an interrupt: {}", program);
-    case Cause::Throttled: return fmt::format("real-time threads were throttled; {} had the processor", program);
-    case Cause::Slept: return "its body waited in the kernel";
     case Cause::Threw: return "its body threw an exception";
     case Cause::BudgetUsed: return "its budget was used up";
     case Cause::QueueFull: return "its queue was full";
@@ -74,7 +69,6 @@ bool is_of_named(Cause cause) {
     case Cause::Overhead:
     case Cause::OffProcessor:
     case Cause::OnWorker:
-    case Cause::Slept:
     case Cause::Wakeup:
     case Cause::Threw:
     case Cause::BudgetUsed:
@@ -89,7 +83,7 @@ bool is_of_named(Cause cause) {
 }  // namespace
 
 std::string name_of(const Culprit &culprit, const Workload &workload) {
-  return culprit.task.valid() ? trace::task_name(workload, culprit.task) : culprit.program;
+  return culprit.task.valid() ? trace::task_name(workload, culprit.task) : std::string();
 }
 
 std::string job_name(const Workload &workload, const JobId &job) {
@@ -98,7 +92,7 @@ std::string job_name(const Workload &workload, const JobId &job) {
 
 std::string describe(const Part &part, const Workload &workload, const JobId &explained) {
   const std::string by = part.by.valid() ? job_name(workload, part.by) + rate_of(workload, part.by.task) : "";
-  std::string text = words(part.cause, by, part.program);
+  std::string text = words(part.cause, by);
   if (part.cause == Cause::Overrun) {
     if (const Task *task = task_of(workload, part.job.task)) {
       text += fmt::format(" of {}", format_duration(task->wcet));
@@ -117,7 +111,7 @@ std::string describe(const PartRow &row, const Workload &workload, const JobId &
 }
 
 std::string describe(Cause cause, const std::string &name) {
-  const std::string text = words(cause, name, name);
+  const std::string text = words(cause, name);
   return is_of_named(cause) && !name.empty() ? name + ": " + text : text;
 }
 

@@ -20,7 +20,7 @@ namespace redag::metrics {
 /// As above; of several parts for example "63 shorter parts, mainly queued behind perception.detect (1.2ms)".
 [[nodiscard]] std::string describe(const PartRow &row, const Workload &workload, const JobId &explained);
 
-/// The name of the task, thread or interrupt that delayed jobs; empty: none is known.
+/// The name of the task that delayed jobs; empty: none is known.
 [[nodiscard]] std::string name_of(const Culprit &culprit, const Workload &workload);
 
 /// For example "queued behind perception.detect", of the culprit with that name.

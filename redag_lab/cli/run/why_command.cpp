@@ -28,7 +28,6 @@ constexpr std::size_t kClosest = 5;  // explained where no deadline was missed
 struct WhyOptions {
   std::string place;
   std::string job;
-  std::string kernel;
   bool end_to_end = false;
   bool all = false;
   bool json = false;
@@ -53,27 +52,14 @@ class Explaining {
     const std::string &file = chosen->file;
     const Result<trace::Recording> trace = trace::Recording::open(file);
     if (!trace) return tl::unexpected<Diagnostics>(trace.error());
-    const Result<std::optional<metrics::KernelRecord>> kernel = kernel_record(trace->info());
-    if (!kernel) return tl::unexpected<Diagnostics>(kernel.error());
     warn_of_remarks(trace->info(), console_);
     if (trace->info().lost_events > 0) {
       console_.warn(fmt::format("{} events of this run were lost: explanations can be wrong",
                                 format_count(trace->info().lost_events)));
     }
-    const Result<metrics::Investigation> investigation = metrics::Investigation::of(*trace, *kernel, kMostExplained);
+    const Result<metrics::Investigation> investigation = metrics::Investigation::of(*trace, kMostExplained);
     if (!investigation) return tl::unexpected<Diagnostics>(investigation.error());
     return options_.job.empty() ? explain_run(*investigation) : explain_job(*investigation);
-  }
-
-  Result<std::optional<metrics::KernelRecord>> kernel_record(const trace::RunInfo &run) const {
-    if (options_.kernel.empty()) return std::optional<metrics::KernelRecord>();
-    if (!run.origin) {
-      return make_error("--kernel: this run does not say when it was, on the kernel's clock",
-                        "runs on threads of this version say it, and simulations do not");
-    }
-    Result<metrics::KernelRecord> record = metrics::KernelRecord::open(options_.kernel, *run.origin);
-    if (!record) return tl::unexpected<Diagnostics>(std::move(record.error()));
-    return std::optional<metrics::KernelRecord>(*std::move(record));
   }
 
   Result<int> explain_run(const metrics::Investigation &investigation) {
@@ -86,7 +72,7 @@ class Explaining {
     overview.explained = subjects.size();
     overview.explanations.resize(options_.all || options_.json ? subjects.size() : std::min(kRows, subjects.size()));
     metrics::CulpritCount causes;
-    const Result<void> explained = explain(investigation, subjects, [&](std::size_t rank, metrics::Explanation one) {
+    const Result<void> explained = investigation.explain(subjects, [&](std::size_t rank, metrics::Explanation one) {
       causes.add(one);
       if (rank < overview.explanations.size()) overview.explanations[rank] = std::move(one);
     });
@@ -113,7 +99,7 @@ class Explaining {
     WhyOverview overview;
     overview.explanations.resize(1);
     const Result<void> explained =
-        explain(investigation, {&subject, 1}, [&](std::size_t /*index*/, metrics::Explanation explanation) {
+        investigation.explain({&subject, 1}, [&](std::size_t /*index*/, metrics::Explanation explanation) {
           overview.explanations.front() = std::move(explanation);
         });
     if (!explained) return tl::unexpected<Diagnostics>(explained.error());
@@ -131,16 +117,6 @@ class Explaining {
       console_.say(describe(one, investigation.run(), console_.out_traits(), options_.all ? 0 : kParts));
     }
     return kExitOk;
-  }
-
-  Result<void> explain(const metrics::Investigation &investigation, std::span<const metrics::Subject> subjects,
-                       const metrics::Investigation::Visit &visit) {
-    const Result<std::uint64_t> lost = investigation.explain(subjects, visit);
-    if (!lost) return tl::unexpected<Diagnostics>(lost.error());
-    if (*lost == 0) return {};
-    console_.warn(
-        fmt::format("the kernel's record lacks {} events: other programs can be missing", format_count(*lost)));
-    return {};
   }
 
   // Returns the job that the user names: "dag.task#12", or "dag.task" for the worst one of the task. Without one, says
@@ -192,10 +168,6 @@ Action add_why(CLI::App &app) {
   app.add_flag("--end-to-end", options->end_to_end,
                "Explain the time since the release of the source whose data the job carries")
       ->needs(job);
-  app.add_option(
-         "--kernel", options->kernel,
-         "The kernel's record of the same time, as text of trace-cmd report or perf script: names other programs")
-      ->type_name("FILE");
   app.add_flag("--all", options->all, "Show every miss, or every part of JOB, however many there are");
   app.add_flag("--json", options->json, "Write one JSON document, and nothing else, to standard output");
   return [options](Console &console) { return Explaining(*options, console).run(); };

@@ -99,7 +99,6 @@ Json json_of(const Culprit &cause, const trace::RunInfo &run) {
   const Workload &workload = run.workload;
   Json row{{"cause", to_string(cause.cause)},
            {"task", cause.task.valid() ? Json(trace::task_name(workload, cause.task)) : Json()},
-           {"program", or_null(cause.program)},
            {"text", metrics::describe(cause, workload)},
            {"remedy", or_null(metrics::remedy(cause, run))},
            {"jobs", cause.jobs},
@@ -123,7 +122,6 @@ Json json_of(const Explanation &one, const trace::RunInfo &run) {
     parts.push_back(Json{{"cause", to_string(part.cause)},
                          {"job", name(part.job)},
                          {"by", name(part.by)},
-                         {"program", or_null(part.program)},
                          {"begin_ns", part.begin == kNever ? Json() : Json(part.begin)},
                          {"length_ns", part.length},
                          {"text", metrics::describe(part, run.workload, id_of(one))}});
