@@ -158,8 +158,8 @@ void WhyPath::measure(const LinkedJob &job, std::size_t first, Time begin, Time 
     excess -= taken;
   }
   std::erase_if(parts_, [](const Part &part) { return part.length == 0; });
-  if (beyond > 0) parts_.push_back({Cause::Overrun, id, {}, {}, kNever, beyond});
-  if (idle > 0) parts_.push_back({Cause::OffProcessor, id, {}, {}, kNever, idle});
+  if (beyond > 0) parts_.push_back({Cause::Overrun, id, {}, kNever, beyond});
+  if (idle > 0) parts_.push_back({Cause::OffProcessor, id, {}, kNever, idle});
 }
 
 }  // namespace redag::metrics
