@@ -51,7 +51,7 @@ TEST(AnalysisReport, AnotherExecutorIsItsOwnHeadlineAndMethods) {
   EXPECT_EQ(lab::task_rows(*analysed)[0].tightest.response, 10 * kMillisecond) << "3 after 7";
   const std::string text = describe(*analysed, StreamTraits{}, false);
   EXPECT_NE(text.find("SingleThreadedExecutor"), std::string::npos) << text;
-  EXPECT_NE(text.find("wait_set ("), std::string::npos) << text;
+  EXPECT_NE(text.find("wait_set and dag_any"), std::string::npos) << text;
   EXPECT_EQ(text.find("rta_nonpreemptive"), std::string::npos) << text;
   EXPECT_EQ(to_json(*analysed)["executor"], "ste");
   EXPECT_EQ(to_json(*analysed)["preemption"], "none");
