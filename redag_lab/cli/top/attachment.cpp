@@ -47,7 +47,7 @@ const live::Listed *Attachment::find(const std::vector<live::Listed> &pages) {
   return &*found;
 }
 
-void Attachment::step(const std::vector<live::Listed> &pages, bool forward) {
+void Attachment::step(const std::vector<live::Listed> &pages) {
   std::vector<const live::Listed *> readable;
   std::size_t at = 0;
   for (const live::Listed &listed : pages) {
@@ -56,7 +56,7 @@ void Attachment::step(const std::vector<live::Listed> &pages, bool forward) {
     readable.push_back(&listed);
   }
   if (readable.empty()) return;
-  attach(*readable[(at + (forward ? 1 : readable.size() - 1)) % readable.size()]);
+  attach(*readable[(at + 1) % readable.size()]);
 }
 
 }  // namespace redag::cli

@@ -35,8 +35,8 @@ class Attachment {
   /// ended is followed by the next one of the same name and program.
   [[nodiscard]] const live::Listed *find(const std::vector<live::Listed> &pages);
 
-  /// Watches the readable executor after the present one, or before it, around the list.
-  void step(const std::vector<live::Listed> &pages, bool forward);
+  /// Watches the readable executor after the present one, around the list.
+  void step(const std::vector<live::Listed> &pages);
 
  private:
   struct Known {

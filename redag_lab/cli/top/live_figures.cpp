@@ -37,14 +37,12 @@ double key_of(const LiveRow &row, LiveOrder order) {
   const Figures &figures = row.figures();
   switch (order) {
     case LiveOrder::Rate: return rate_of(figures, row.frame());
-    case LiveOrder::P99: return static_cast<double>(figures.recent_p99);
     case LiveOrder::Longest: return static_cast<double>(figures.recent_max);
     // Recent misses outrank earlier ones.
     case LiveOrder::Misses:
       return static_cast<double>(figures.recent_misses) * 1e12 + static_cast<double>(figures.misses);
     case LiveOrder::Cpu: return cpu_of(figures, row.frame());
-    case LiveOrder::Dag:
-    case LiveOrder::Name: break;
+    case LiveOrder::Dag: break;
   }
   return 0;
 }
@@ -69,7 +67,7 @@ void add_dag(const live::Listed &executor, std::size_t index, const std::string 
 }  // namespace
 
 const char *to_string(LiveOrder order) {
-  constexpr std::array<const char *, kLiveOrders> kNames{"dag", "name", "rate", "p99", "max", "misses", "cpu"};
+  constexpr std::array<const char *, kLiveOrders> kNames{"dag", "rate", "max", "misses", "cpu"};
   return kNames[static_cast<std::size_t>(order)];
 }
 
@@ -81,29 +79,19 @@ std::string full_name(const TaskFrame &task, const Frame &frame) {
 std::string LiveRow::name() const { return task != nullptr ? full_name(*task, frame()) : dag->name; }
 
 std::vector<LiveRow> rows_of(std::span<const live::Listed> pages, const LiveView &view) {
-  const bool by_dag = view.order == LiveOrder::Dag && !view.dags_only && !view.all;
+  const bool by_dag = view.order == LiveOrder::Dag && !view.all;
   std::vector<LiveRow> rows;
   for (const live::Listed &listed : pages) {
     if (!listed.page) continue;
-    const std::vector<DagFrame> &dags = listed.page->frame.dags;
     // Of all executors, one can be meant by its name.
     const std::string filter = view.all && contains(listed.page->frame.name, view.filter) ? "" : view.filter;
-    for (std::size_t i = 0; i < dags.size(); ++i) {
-      const std::size_t d = by_dag && view.reversed ? dags.size() - 1 - i : i;
-      if (!view.dags_only || view.all) {
-        add_dag(listed, d, filter, by_dag, rows);
-      } else if (contains(dags[d].name, view.filter)) {
-        rows.push_back({&listed, &dags[d]});
-      }
-    }
+    for (std::size_t d = 0; d < listed.page->frame.dags.size(); ++d) add_dag(listed, d, filter, by_dag, rows);
   }
   if (by_dag) return rows;
   std::stable_sort(rows.begin(), rows.end(), [&](const LiveRow &a, const LiveRow &b) {
-    if (view.order == LiveOrder::Name) return a.name() < b.name();
-    if (view.order == LiveOrder::Dag && view.all) return urgency(a) < urgency(b);
+    if (view.order == LiveOrder::Dag) return urgency(a) < urgency(b);
     return key_of(a, view.order) > key_of(b, view.order);
   });
-  if (view.reversed) std::reverse(rows.begin(), rows.end());
   return rows;
 }
 

@@ -16,17 +16,15 @@
 
 namespace redag::cli {
 
-enum class LiveOrder : std::uint8_t { Dag, Name, Rate, P99, Longest, Misses, Cpu };
-inline constexpr std::size_t kLiveOrders = 7;
+enum class LiveOrder : std::uint8_t { Dag, Rate, Longest, Misses, Cpu };
+inline constexpr std::size_t kLiveOrders = 5;
 [[nodiscard]] const char *to_string(LiveOrder order);
 
 struct LiveView {
   bool all = false;                  // the tasks of all executors
   LiveOrder order = LiveOrder::Dag;  // Dag: each DAG with its tasks below it, or of all executors the most urgent task
                                      // first; otherwise tasks, the largest first
-  bool reversed = false;
-  bool dags_only = false;   // the rows of DAGs, in the order of `order`
-  std::string filter = {};  // part of the names to show, in any case; empty: all
+  std::string filter = {};           // part of the names to show, in any case; empty: all
 };
 
 /// A DAG or a task of an executor's page.

@@ -40,20 +40,12 @@ std::vector<live::Listed> machine() {
 
 TEST(LiveRows, Orders) {
   const live::Listed listed = small_page();
-  const auto names = [&](LiveOrder order, bool reversed = false, bool dags_only = false) {
-    return names_of(listed, {.order = order, .reversed = reversed, .dags_only = dags_only});
-  };
+  const auto names = [&](LiveOrder order) { return names_of(listed, {.order = order}); };
   const Names upwards{"slow.plan", "fast.act", "fast.sense"};
-  const Names downwards{"fast.sense", "fast.act", "slow.plan"};
   EXPECT_EQ(names(LiveOrder::Rate), upwards);
-  EXPECT_EQ(names(LiveOrder::Rate, true), downwards);
   EXPECT_EQ(names(LiveOrder::Cpu), upwards);
-  EXPECT_EQ(names(LiveOrder::P99), downwards);
-  EXPECT_EQ(names(LiveOrder::Name), (Names{"fast.act", "fast.sense", "slow.plan"}));
+  EXPECT_EQ(names(LiveOrder::Longest), (Names{"fast.sense", "fast.act", "slow.plan"}));
   EXPECT_EQ(names(LiveOrder::Dag), (Names{"fast", "fast.sense", "fast.act", "slow", "slow.plan"}));
-  EXPECT_EQ(names(LiveOrder::Dag, true), (Names{"slow", "slow.plan", "fast", "fast.sense", "fast.act"}));
-  EXPECT_EQ(names(LiveOrder::Dag, false, true), (Names{"fast", "slow"}));
-  EXPECT_EQ(names(LiveOrder::Name, true, true), (Names{"slow", "fast"}));
 }
 
 TEST(LiveRows, WhoMissesNowIsFirst) {
@@ -68,10 +60,7 @@ TEST(LiveRows, AFilterKeepsTheDagsOfItsTasks) {
   const live::Listed listed = small_page();
   EXPECT_EQ(names_of(listed, {.filter = "PLAN"}), (Names{"slow", "slow.plan"}));
   EXPECT_EQ(names_of(listed, {.filter = "fast"}), (Names{"fast", "fast.sense", "fast.act"}));
-  EXPECT_EQ(names_of(listed, {.order = LiveOrder::Name, .filter = "s"}),
-            (Names{"fast.act", "fast.sense", "slow.plan"}));
-  EXPECT_EQ(names_of(listed, {.order = LiveOrder::Name, .filter = "fast.s"}), (Names{"fast.sense"}));
-  EXPECT_EQ(names_of(listed, {.dags_only = true, .filter = "ow"}), (Names{"slow"}));
+  EXPECT_EQ(names_of(listed, {.order = LiveOrder::Rate, .filter = "fast.s"}), (Names{"fast.sense"}));
   EXPECT_EQ(names_of(listed, {.filter = "x"}), Names{});
 }
 
@@ -85,7 +74,7 @@ TEST(LiveRows, OfAllExecutorsFollowTheKernelsOrder) {
   EXPECT_THAT(names({.all = true}), ElementsAre("cart:sense", "cart:act", "arm:sense", "arm:act", "cart:plan",
                                                 "arm:plan", "plain:sense", "plain:act", "plain:plan"));
   EXPECT_THAT(names({.all = true, .filter = "PLAN"}), ElementsAre("cart:plan", "arm:plan", "plain:plan"));
-  EXPECT_THAT(names({.all = true, .reversed = true, .filter = "arm"}), ElementsAre("arm:plan", "arm:act", "arm:sense"));
+  EXPECT_THAT(names({.all = true, .filter = "arm"}), ElementsAre("arm:sense", "arm:act", "arm:plan"));
   EXPECT_THAT(names({.all = true, .order = LiveOrder::Rate, .filter = "act"}),
               ElementsAre("cart:act", "arm:act", "plain:act"));
 }
@@ -197,14 +186,10 @@ TEST(Attachment, StepsAroundTheReadableOnes) {
   pages[2].page = make_error("no");
   EXPECT_EQ(attachment.find(pages), &pages[1]);
   for (const std::size_t next : {3U, 0U, 1U}) {
-    attachment.step(pages, true);
+    attachment.step(pages);
     EXPECT_EQ(attachment.find(pages), &pages[next]);
   }
-  for (const std::size_t previous : {0U, 3U, 1U}) {
-    attachment.step(pages, false);
-    EXPECT_EQ(attachment.find(pages), &pages[previous]);
-  }
-  attachment.step({}, true);
+  attachment.step({});
   EXPECT_EQ(attachment.find(pages), &pages[1]);
 }
 

@@ -80,18 +80,9 @@ std::string id_of(const live::Listed &listed) {
 }
 
 Table task_table(std::span<const live::Listed> pages, const LiveView &view) {
-  std::vector<Column> columns{{view.dags_only ? "DAG" : "task", false, 99},
-                              {"rate/s", true, 11},
-                              {"p50", true, 7},
-                              {"p99", true, 14},
-                              {"max", true, 12},
-                              {"worst", true, 8},
-                              {"deadline", true, 10},
-                              {"bound", true, 6},
-                              {"missed", true, 13},
-                              {"active", true, 5},
-                              {"away", true, 3},
-                              {"ready", true, 4},
+  std::vector<Column> columns{{"task", false, 99},  {"rate/s", true, 11}, {"p50", true, 7},       {"p99", true, 14},
+                              {"max", true, 12},    {"worst", true, 8},   {"deadline", true, 10}, {"bound", true, 6},
+                              {"missed", true, 13}, {"active", true, 5},  {"away", true, 3},      {"ready", true, 4},
                               {"cpu", true, 9}};
   const std::vector<Column> of_executor{
       {"level", true, 20}, {"period", true, 10}, {"pid", true, 5}, {"executor", false, 15}};

@@ -111,7 +111,7 @@ class Top {
     const InterruptGuard guard;
     Screen screen(colour);
     look();
-    if (pages_.size() > 1 && options_.target.empty() && !options_.view.all) state_.mode = TopMode::List;
+    if (pages_.size() > 1 && options_.target.empty()) state_.view.all = true;
     while (!InterruptGuard::interrupted()) {
       const Screen::Size size = screen.size();
       const TopInput input{.pages = pages_, .shown = shown_ ? &*shown_ : nullptr, .is_gone = is_gone_, .now = now_};
@@ -120,7 +120,7 @@ class Top {
       const TopAction action = press(screen.wait(std::max<Duration>(left, 0)), state_);
       if (action == TopAction::Quit) break;
       if (action != TopAction::None) {
-        attachment_.step(pages_, action == TopAction::Next);
+        attachment_.step(pages_);
         show();
       }
       if (runtime::monotonic_now() >= next_look_) look();
@@ -174,8 +174,8 @@ int top(const TopArguments &options, Console &console) {
   return Top(options, target).run(console.out_traits().colour);
 }
 
-constexpr std::array kSortOrders{LiveOrder::Dag,     LiveOrder::Name,   LiveOrder::Rate, LiveOrder::P99,
-                                 LiveOrder::Longest, LiveOrder::Misses, LiveOrder::Cpu};
+constexpr std::array kSortOrders{LiveOrder::Dag, LiveOrder::Rate, LiveOrder::Longest, LiveOrder::Misses,
+                                 LiveOrder::Cpu};
 
 }  // namespace
 
@@ -183,18 +183,16 @@ Action add_top(CLI::App &app) {
   auto options = std::make_shared<TopArguments>();
   LiveView &view = options->view;
   CLI::Option *target = app.add_option("PID", options->target,
-                                       "Process ID; by default the only running executor, or a list to choose from");
+                                       "Process ID; by default the only running executor, or all of them in one table");
   CLI::Option *list = app.add_flag("--list", options->list, "List the running executors")->excludes(target);
-  CLI::Option *all = app.add_flag("--all", view.all, "Show the tasks of all executors in one table, most urgent first")
-                         ->excludes(target)
-                         ->excludes(list);
+  app.add_flag("--all", view.all, "Show the tasks of all executors in one table, most urgent first")
+      ->excludes(target)
+      ->excludes(list);
   app.add_flag("--once", options->once, "Print one frame as text and exit")->excludes(list);
   app.add_flag("--json", options->json, "Print one frame (or the list) as a JSON document and exit");
   add_duration(app, "--interval", options->interval, "Time between two updates");
   add_choice(app, "--sort", view.order, choices_of(kSortOrders), "Order of the rows");
-  app.add_flag("--reverse", view.reversed, "Reverse the order");
   app.add_option("--filter", view.filter, "Show only DAGs and tasks whose name contains this")->type_name("TEXT");
-  app.add_flag("--dags", view.dags_only, "Show only DAGs, not their tasks")->excludes(all);
   add_pages_folder(app, options->folder);
   return [options](Console &console) { return top(*options, console); };
 }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 namespace redag::cli {
 namespace {
@@ -54,7 +55,7 @@ TopAction press_table(const KeyPress &key, TopState &state) {
     if (view.filter.empty()) return TopAction::Quit;
     view.filter.clear();
   }
-  if (key.key == Key::Tab) return TopAction::Next;
+  if (key.key == Key::Tab) return std::exchange(view.all, false) ? TopAction::None : TopAction::Next;
   if (key.key != Key::Text) {
     scroll(key.key, state);
     return TopAction::None;
@@ -64,13 +65,10 @@ TopAction press_table(const KeyPress &key, TopState &state) {
   switch (key.text) {
     case '?':
     case 'h': enter(TopMode::Help, state); break;
-    case 'l': enter(TopMode::List, state); break;
     case 'f':
     case '/': enter(TopMode::Filter, state); break;
     case '<': turn_to(order + kLiveOrders - 1); break;
     case '>': turn_to(order + 1); break;
-    case 'i': view.reversed = !view.reversed; break;
-    case 'g': view.dags_only = !view.dags_only; break;
     case 'a': view.all = !view.all; break;
     case ' ': state.paused = !state.paused; break;
     case 'q': return TopAction::Quit;
@@ -79,23 +77,13 @@ TopAction press_table(const KeyPress &key, TopState &state) {
   return TopAction::None;
 }
 
-/// The list and the help: letters, Enter and Escape go back to the table.
-TopAction press_aside(const KeyPress &key, TopState &state) {
-  const bool is_list = state.mode == TopMode::List;
-  switch (key.key) {
-    case Key::Text:
-      if (key.text == 'q') return TopAction::Quit;
-      [[fallthrough]];
-    case Key::Enter:
-    case Key::Escape: enter(TopMode::Table, state); break;
-    case Key::Tab: return TopAction::Next;
-    case Key::Up:
-      if (is_list) return TopAction::Previous;
-      [[fallthrough]];
-    case Key::Down:
-      if (is_list) return TopAction::Next;
-      [[fallthrough]];
-    default: scroll(key.key, state); break;
+/// The help: letters, Enter and Escape go back to the table.
+TopAction press_help(const KeyPress &key, TopState &state) {
+  if (key.key == Key::Text && key.text == 'q') return TopAction::Quit;
+  if (key.key == Key::Text || key.key == Key::Enter || key.key == Key::Escape) {
+    enter(TopMode::Table, state);
+  } else {
+    scroll(key.key, state);
   }
   return TopAction::None;
 }
@@ -107,10 +95,9 @@ TopAction press(const KeyPress &key, TopState &state) {
   switch (state.mode) {
     case TopMode::Filter: return press_filter(key, state);
     case TopMode::Table: return press_table(key, state);
-    case TopMode::List:
     case TopMode::Help: break;
   }
-  return press_aside(key, state);
+  return press_help(key, state);
 }
 
 }  // namespace redag::cli

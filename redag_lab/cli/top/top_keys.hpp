@@ -14,7 +14,6 @@ namespace redag::cli {
 
 enum class TopMode : std::uint8_t {
   Table,  // DAGs and tasks
-  List,   // the running executors
   Help,
   Filter,  // the table, while a filter is being typed
 };
@@ -30,8 +29,7 @@ struct TopState {
 enum class TopAction : std::uint8_t {
   None,
   Quit,
-  Next,      // shows the next executor
-  Previous,  // shows the previous one
+  Next,  // shows the next executor
 };
 
 /// Changes `state` as the key says. A key without meaning changes nothing.

@@ -40,15 +40,15 @@ TEST_F(Keys, Scroll) {
 
 TEST_F(Keys, ChooseTheRows) {
   press(">>");
-  EXPECT_EQ(state_.view.order, LiveOrder::Rate);
+  EXPECT_EQ(state_.view.order, LiveOrder::Longest);
   press("<<<");
   EXPECT_EQ(state_.view.order, LiveOrder::Cpu);
   press(">");
   EXPECT_EQ(state_.view.order, LiveOrder::Dag);
-  press("iga ");
-  EXPECT_TRUE(state_.view.reversed && state_.view.dags_only && state_.view.all && state_.paused);
-  press("iga ");
-  EXPECT_FALSE(state_.view.reversed || state_.view.dags_only || state_.view.all || state_.paused);
+  press("a ");
+  EXPECT_TRUE(state_.view.all && state_.paused);
+  press("a ");
+  EXPECT_FALSE(state_.view.all || state_.paused);
 }
 
 TEST_F(Keys, AFilterActsWhileItIsTyped) {
@@ -81,29 +81,23 @@ TEST_F(Keys, HelpScrollsAndGoes) {
   EXPECT_EQ(state_.mode, TopMode::Help);
   press(Key::Down);
   EXPECT_EQ(state_.first, 1U);
-  press("i");
+  press("a");
   EXPECT_EQ(state_.mode, TopMode::Table);
   EXPECT_EQ(state_.first, 0U);
-  EXPECT_FALSE(state_.view.reversed) << "the letter only leaves the help";
+  EXPECT_FALSE(state_.view.all) << "the letter only leaves the help";
   press("h");
   EXPECT_EQ(press("q"), TopAction::Quit);
 }
 
-TEST_F(Keys, AnExecutorIsChosen) {
+TEST_F(Keys, TabShowsOneExecutorAndThenTheNext) {
+  press("a");
+  EXPECT_EQ(press(Key::Tab), TopAction::None);
+  EXPECT_FALSE(state_.view.all);
   EXPECT_EQ(press(Key::Tab), TopAction::Next);
-  press("l");
-  EXPECT_EQ(state_.mode, TopMode::List);
-  EXPECT_EQ(press(Key::Down), TopAction::Next);
-  EXPECT_EQ(press(Key::Up), TopAction::Previous);
-  EXPECT_EQ(press(Key::Enter), TopAction::None);
-  EXPECT_EQ(state_.mode, TopMode::Table);
-  press("l");
-  EXPECT_EQ(press(Key::Escape), TopAction::None);
-  EXPECT_EQ(state_.mode, TopMode::Table);
 }
 
 TEST_F(Keys, TheTerminalCanGoInEachMode) {
-  for (const TopMode mode : {TopMode::Table, TopMode::List, TopMode::Help, TopMode::Filter}) {
+  for (const TopMode mode : {TopMode::Table, TopMode::Help, TopMode::Filter}) {
     state_.mode = mode;
     EXPECT_EQ(press(Key::Closed), TopAction::Quit);
     EXPECT_EQ(press(Key::None), TopAction::None);

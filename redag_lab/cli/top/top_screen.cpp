@@ -28,10 +28,9 @@ constexpr std::array kHelp{
     "KEYS",
     "  arrows, page keys, Home, End    scroll",
     "  f        show only names that contain a text (Esc: all again)",
-    "  < >  i   next order of the rows; reverse it",
-    "  g        only DAGs",
+    "  < >      next order of the rows",
     "  a        the tasks of all executors, most urgent first",
-    "  l  Tab   list of executors; next executor",
+    "  Tab      next executor",
     "  space    pause the picture (not the executor)",
     "  q        quit",
     "COLUMNS, over the last seconds",
@@ -50,7 +49,7 @@ constexpr std::array kHelp{
 };
 
 // Keys that matter most come first, because a narrow screen shows the beginning.
-constexpr const char *kKeys = "? help  q quit  f filter  < > sort  g DAGs  a all  l list";
+constexpr const char *kKeys = "? help  q quit  f filter  < > sort  a all  Tab next";
 constexpr const char *kNone = "no running executor publishes a live page; waiting for one";
 
 /// Returns the lines above the tables of an executor.
@@ -97,7 +96,6 @@ struct Parts {
   Lines head;
   Lines body;
   std::string foot;
-  std::size_t in_sight = 0;  // a line of the body that has to be seen
 };
 
 class Drawing {
@@ -107,27 +105,12 @@ class Drawing {
 
   [[nodiscard]] Parts draw() const {
     if (state_.mode == TopMode::Help) return {{}, {kHelp.begin(), kHelp.end()}, "any letter: back  q quit"};
-    const bool is_empty =
-        state_.view.all || state_.mode == TopMode::List ? input_.pages.empty() : input_.shown == nullptr;
+    const bool is_empty = state_.view.all ? input_.pages.empty() : input_.shown == nullptr;
     if (is_empty) return {{kNone}, {}, "q quit"};
-    return state_.mode == TopMode::List ? list() : table();
+    return table();
   }
 
  private:
-  [[nodiscard]] Parts list() const {
-    constexpr std::size_t kMark = 2;
-    Parts parts{{},
-                executor_table(input_.pages, input_.now).lines(columns_ > kMark ? columns_ - kMark : 1, colour_),
-                "up, down: choose  Enter: show  q quit"};
-    for (std::size_t i = 0; i < parts.body.size(); ++i) {
-      const bool is_shown = i > 0 && input_.shown != nullptr && input_.pages[i - 1].path == input_.shown->path;
-      parts.body[i].insert(0, is_shown ? "> " : "  ");
-      if (is_shown) parts.in_sight = i - 1;
-    }
-    move_titles(parts);
-    return parts;
-  }
-
   [[nodiscard]] Parts table() const {
     Parts parts;
     if (!state_.view.all) {
@@ -142,7 +125,9 @@ class Drawing {
     parts.head.push_back(status());
     const auto pages = state_.view.all ? std::span(input_.pages) : std::span(input_.shown, 1);
     parts.body = task_table(pages, state_.view).lines(columns_, colour_);
-    move_titles(parts);
+    // Titles of the table stay while its rows are scrolled.
+    parts.head.push_back(std::move(parts.body.front()));
+    parts.body.erase(parts.body.begin());
     if (parts.body.empty()) {
       parts.body.emplace_back(state_.view.filter.empty() ? "no tasks yet" : "no name contains the filter's text");
     }
@@ -153,18 +138,12 @@ class Drawing {
   [[nodiscard]] std::string status() const {
     const LiveView &view = state_.view;
     const char *const order = view.all && view.order == LiveOrder::Dag ? "urgency" : to_string(view.order);
-    std::string line = fmt::format("sorted by {}{}", order, view.reversed ? ", reversed" : "");
+    std::string line = fmt::format("sorted by {}", order);
     if (!view.all) line += ", last " + humanize_duration(input_.shown->page->frame.window);
     line = tinted(line, Tint::Faint, colour_);
     if (!view.filter.empty()) line += tinted("  filter: " + view.filter, Tint::Caution, colour_);
     if (state_.paused) line += tinted("  paused", Tint::Caution, colour_);
     return line;
-  }
-
-  /// Titles of a table stay while its rows are scrolled.
-  static void move_titles(Parts &parts) {
-    parts.head.push_back(std::move(parts.body.front()));
-    parts.body.erase(parts.body.begin());
   }
 
   const TopState &state_;
@@ -184,7 +163,6 @@ std::vector<std::string> draw_top(TopState &state, const TopInput &input, std::s
   const std::size_t room = above - screen.size();
   const std::size_t count = parts.body.size();
   state.page = std::max<std::size_t>(room, 1);
-  if (state.mode == TopMode::List) state.first = parts.in_sight < room ? 0 : parts.in_sight - room + 1;
   state.first = std::min(state.first, count > room ? count - room : 0);
   const std::size_t last = std::min(count, state.first + room);
   for (std::size_t i = state.first; i < last; ++i) screen.push_back(std::move(parts.body[i]));

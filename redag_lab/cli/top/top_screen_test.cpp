@@ -172,20 +172,6 @@ TEST(TopScreen, OfTooManyDevicesSomeAreCounted) {
   EXPECT_THAT(draw_once(robot, {}, frame.published, 80, false), HasSubstr("\n8 more devices\n"));
 }
 
-TEST(TopScreen, TheListMarksTheExecutor) {
-  TopState state;
-  state.mode = TopMode::List;
-  live::Listed refused = small_page(14, "arm");
-  refused.page = make_error("/x/redag.14.0 is not read, because it belongs to user 1000");
-  std::vector<live::Listed> pages{small_page(), refused, robot_page()};
-  const TopInput input{.pages = pages, .shown = &pages[2], .now = 3'700 * kSecond};
-  const Lines lines = draw_top(state, input, 80, 24, false);
-  EXPECT_THAT(lines[1], StartsWith("     12  cart"));
-  EXPECT_THAT(lines[2], StartsWith("     14  ?"));
-  EXPECT_THAT(lines[3], StartsWith("> 20817  robot"));
-  EXPECT_THAT(draw_top(state, input, 80, 3, false)[1], StartsWith("> 20817  robot")) << "the mark stays in sight";
-}
-
 TEST(TopScreen, OfAllExecutorsNamesThem) {
   std::vector<live::Listed> pages{small_page(), small_page(13, "arm")};
   pages[1].page->frame.tasks[0].priority = 79;
@@ -199,7 +185,7 @@ TEST(TopScreen, OfAllExecutorsNamesThem) {
 
 TEST(TopScreen, NamesOfAllTasksAreWholeAt80x24) {
   const live::Listed robot = robot_page();
-  for (const LiveOrder order : {LiveOrder::Dag, LiveOrder::Name, LiveOrder::P99}) {
+  for (const LiveOrder order : {LiveOrder::Dag, LiveOrder::Rate, LiveOrder::Longest}) {
     TopState state;
     state.view.order = order;
     for (std::size_t first = 0; first < 20; ++first) {
@@ -212,7 +198,7 @@ TEST(TopScreen, NamesOfAllTasksAreWholeAt80x24) {
 
 TEST(TopScreen, FitsEachSize) {
   const live::Listed robot = accelerated_page();
-  for (const TopMode mode : {TopMode::Table, TopMode::List, TopMode::Help, TopMode::Filter}) {
+  for (const TopMode mode : {TopMode::Table, TopMode::Help, TopMode::Filter}) {
     TopState state;
     state.mode = mode;
     for (const std::size_t columns : {1U, 2U, 3U, 7U, 12U, 20U, 37U, 40U, 72U, 80U, 81U, 133U, 300U}) {
