@@ -251,6 +251,10 @@ class Top(Case):
             self.linked(folder, first)
             screen.wait_for(f"redag {first.pid}")  # the only executor
             self.linked(folder, second)
+            screen.press("a")
+            screen.wait(lambda: sum("fast.sense" in row for row in screen.screen.display) == 2, "not both executors")
+            screen.press("\t")
+            screen.wait_for(f"redag {first.pid}")
             screen.press("\t")
             screen.wait_for(f"redag {second.pid}")
             screen.press("\t")  # around the list
@@ -296,7 +300,7 @@ class Top(Case):
         screen.end()
 
 
-UP, DOWN, HOME, END = "\033OA", "\033OB", "\033[1~", "\033[4~"
+HOME, END = "\033[1~", "\033[4~"
 ESCAPE = "\033"
 
 
