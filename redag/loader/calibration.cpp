@@ -23,8 +23,7 @@ class OverheadsReader : private yaml::ValueReader {
   OverheadsReader(const Node &root, std::string file) : ValueReader(std::move(file)), root_(root) {}
 
   Result<Calibration> run() {
-    // `measured` is for people and is not read.
-    if (check_map(root_, "an overheads file", {"overheads", "provenance", "measured"})) {
+    if (check_map(root_, "an overheads file", {"overheads", "provenance"})) {
       read_overheads();
       read_provenance();
     }
@@ -121,18 +120,6 @@ void write(Writer &out, std::string_view key, const std::optional<Overheads> &ov
   out.end_map();
 }
 
-void write(Writer &out, const Measured &row) {
-  out.begin_map(Writer::Layout::OneLine);
-  out.write("what", row.what);
-  out.write("threads", row.threads);
-  out.write("samples", row.samples);
-  out.write("p50", format_duration(row.p50));
-  out.write("p99", format_duration(row.p99));
-  out.write("p999", format_duration(row.p999));
-  out.write("max", format_duration(row.max));
-  out.end_map();
-}
-
 }  // namespace
 
 std::string Calibration::provenance() const {
@@ -172,12 +159,6 @@ std::string to_yaml(const Calibration &calibration) {
   out.write("complete", calibration.complete ? "true" : "false");
   write_quoted(out, "version", calibration.version);
   out.end_map();
-  if (!calibration.measured.empty()) {
-    out.text("measured");
-    out.begin_list();
-    for (const Measured &row : calibration.measured) write(out, row);
-    out.end_list();
-  }
   out.end_map();
   return "# What this machine adds to the jobs of a workload: docs/calibration.md. Charged with --overheads FILE.\n" +
          out.take();

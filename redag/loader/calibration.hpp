@@ -17,19 +17,6 @@
 
 namespace redag {
 
-/// The distribution of one measured quantity.
-struct Measured {
-  std::string what;     // "dispatch"
-  std::string threads;  // "realtime", "normal"
-  std::uint64_t samples = 0;
-  Duration p50 = 0;
-  Duration p99 = 0;
-  Duration p999 = 0;
-  Duration max = 0;
-
-  friend bool operator==(const Measured &, const Measured &) = default;
-};
-
 /// A machine's overheads, and their provenance.
 struct Calibration {
   std::optional<Overheads> realtime;  // SCHED_FIFO threads; empty: the process had no right to them
@@ -43,7 +30,6 @@ struct Calibration {
   Duration duration = 0;
   std::uint32_t processors = 0;
   bool complete = true;  // false: ended early, with the maxima until then
-  std::vector<Measured> measured;
 
   /// For example "overheads of 2026-11-23T08:30:00Z on host (30s)".
   [[nodiscard]] std::string provenance() const;

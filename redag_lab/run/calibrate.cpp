@@ -255,8 +255,8 @@ class Noted {
   std::vector<std::vector<Absence>> absences_;
 };
 
-// Returns the differences between readings of a thread's processor-time clock.
-std::vector<Duration> clock_costs() {
+// Returns the 99.9th percentile of the differences between readings of a thread's processor-time clock.
+Duration clock_cost() {
   constexpr int kReadings = 20'000;
   std::vector<Duration> costs;
   Duration before = runtime::thread_cpu_now();
@@ -265,7 +265,8 @@ std::vector<Duration> clock_costs() {
     costs.push_back(now - before);
     before = now;
   }
-  return costs;
+  std::sort(costs.begin(), costs.end());
+  return costs[costs.size() * 999 / 1000];
 }
 
 class Calibrating {
@@ -275,11 +276,11 @@ class Calibrating {
 
   Result<Calibration> run() {
     workload_ = calibration_workload(static_cast<std::uint32_t>(cpus_.size()));
-    note("thread_clock", "any", clock_costs());
+    const Duration clock = clock_cost();
     const Time begun = runtime::monotonic_now();
     if (Result<void> done = measure(); !done) return tl::unexpected(done.error());
     result_.duration = runtime::monotonic_now() - begun;
-    return conclude();
+    return conclude(clock);
   }
 
  private:
@@ -355,17 +356,16 @@ class Calibrating {
     });
   }
 
-  Result<Calibration> conclude() {
+  Result<Calibration> conclude(Duration clock) {
     for (const bool realtime : {true, false}) {
       const Findings &found = findings_[realtime ? 1 : 0];
-      note_all(found, realtime ? "realtime" : "normal");
       if (!found.is_complete()) continue;
       Overheads charged;
       charged.timer = *std::max_element(found.timer.begin(), found.timer.end());
       charged.lateness = *std::max_element(found.lateness.begin(), found.lateness.end());
       charged.stall = found.loss(&Gap::length);
       charged.noise = found.loss(&Gap::charged);
-      charged.clock = result_.measured.front().p999;
+      charged.clock = clock;
       Loss beyond;
       charged.dispatch = usual_delay(found.dispatch, found.ran, beyond);
       take_larger(charged.stall, beyond);
@@ -386,30 +386,6 @@ class Calibrating {
     result_.processor = trace::this_machine().model;
     result_.rights = band_.top_job > 0 ? fmt::format("SCHED_FIFO up to {}", band_.timer) : "no SCHED_FIFO";
     return std::move(result_);
-  }
-
-  void note_all(const Findings &found, const char *threads) {
-    note("timer", threads, found.timer);
-    note("lateness", threads, found.lateness);
-    note("dispatch", threads, lengths_of(found.dispatch));
-    note("preempt", threads, lengths_of(found.preempt));
-    for (const auto &[name, part] : {std::pair("stall", &Gap::length), std::pair("noise", &Gap::charged)}) {
-      std::vector<Duration> lengths;
-      for (const auto &[lost, watched] : found.losses(part)) {
-        for (const LossSample &sample : lost) lengths.push_back(sample.length);
-      }
-      note(name, threads, std::move(lengths));
-    }
-  }
-
-  // Adds the distribution of a quantity to the result.
-  void note(const char *what, const char *threads, std::vector<Duration> values) {
-    if (values.empty()) return;
-    std::sort(values.begin(), values.end());
-    const auto at = [&](double share) {
-      return values[std::min(values.size() - 1, static_cast<std::size_t>(share * static_cast<double>(values.size())))];
-    };
-    result_.measured.push_back({what, threads, values.size(), at(0.5), at(0.99), at(0.999), at(1)});
   }
 
   const CalibrateOptions &options_;

@@ -8,7 +8,6 @@
 
 #include "redag/base/text.hpp"
 #include "redag/loader/provenance.hpp"
-#include "redag_analysis/text/table.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/files.hpp"
 #include "redag_lab/cli/terminal/options.hpp"
@@ -27,24 +26,8 @@ struct CalibrateOptions {
   std::string out = "overheads.yaml";
 };
 
-std::string describe(const Calibration &calibration, const StreamTraits &terminal) {
-  Table table({{"measured", false, 9},
-               {"threads", false, 8},
-               {"samples", true, 6},
-               {"p50", true, 3},
-               {"p99", true, 4},
-               {"p99.9", true, 2},
-               {"max", true, 9}});
-  for (const Measured &row : calibration.measured) {
-    table.add({{row.what},
-               {row.threads},
-               {format_count(row.samples)},
-               {humanize_duration(row.p50)},
-               {humanize_duration(row.p99)},
-               {humanize_duration(row.p999)},
-               {humanize_duration(row.max)}});
-  }
-  std::string text = table.render(terminal.width, terminal.colour) + "\n";
+std::string describe(const Calibration &calibration) {
+  std::string text;
   const auto charged = [&](const char *threads, const std::optional<Overheads> &overheads) {
     if (overheads) text += fmt::format("overheads charged on {} threads: {}\n", threads, to_string(*overheads));
   };
@@ -89,7 +72,7 @@ int calibrate(const CalibrateOptions &options, Console &console) {
         "this process may not use SCHED_FIFO: only ordinary threads were measured, as preemption 'cooperative' and "
         "'none' use them");
   }
-  console.say(describe(calibration, console.out_traits()));
+  console.say(describe(calibration));
   if (const Result<void> written = write_text(options.out, to_yaml(calibration)); !written) {
     console.note(written.error());
     return kExitBad;
