@@ -226,29 +226,15 @@ class Events(Case):
         self.expect(redag("events", out, "-o", in_file), 0)
         self.assertEqual([json.loads(line) for line in in_file.read_text().splitlines()], printed)
 
-    def test_a_picture_can_be_made_later(self):
-        with_picture, without = self.results("with"), self.results("without", "--picture", "never")
-        self.assertFalse((without / "trace.pftrace").exists())
-        made = self.folder / "made.pftrace"
-        self.expect(redag("events", without, "--format", "perfetto", "-o", made), 0)
-        drawn = [[event for event in Picture(path).events if event[2] != "run"] for path in (with_picture / "trace.pftrace", made)]
+    def test_a_picture_and_jobs_can_be_made_later(self):
+        results = self.results("with")
+        made, jobs = self.folder / "made.pftrace", self.folder / "made.csv"
+        self.expect(redag("events", results, "--format", "perfetto", "-o", made), 0)
+        drawn = [[event for event in Picture(path).events if event[2] != "run"] for path in (results / "trace.pftrace", made)]
         self.assertEqual(drawn[0], drawn[1])
-
-    def test_what_an_earlier_run_left_is_replaced(self):
-        out = self.results("out")
-        self.assertTrue((out / "trace.pftrace").exists())
-        self.results("out", "--picture", "never")
-        self.assertEqual(sorted(path.name for path in out.iterdir()), ["events.redag", "jobs.csv", "summary.json"])
-        self.results("out", "--picture", "never", "--jobs", "never")
-        self.assertEqual(sorted(path.name for path in out.iterdir()), ["events.redag", "summary.json"])
-
-    def test_the_jobs_can_be_listed_later(self):
-        listed, not_listed = self.results("with"), self.results("without", "--jobs", "never")
-        made = self.folder / "made.csv"
-        self.expect(redag("events", not_listed, "--format", "jobs"), 2, "name a file with -o")
-        self.expect(redag("events", not_listed, "--format", "jobs", "-o", made), 0)
-        self.assertEqual((listed / "jobs.csv").read_bytes(), made.read_bytes())
-        self.assertNotIn("jobs.csv", redag("simulate", self.cart, "--jobs", "never", "--out", not_listed).stdout)
+        self.expect(redag("events", results, "--format", "jobs"), 2, "name a file with -o")
+        self.expect(redag("events", results, "--format", "jobs", "-o", jobs), 0)
+        self.assertEqual((results / "jobs.csv").read_bytes(), jobs.read_bytes())
 
     def test_a_long_run_has_no_picture(self):
         out = self.folder / "out"
@@ -256,8 +242,10 @@ class Events(Case):
         self.assertFalse((out / "trace.pftrace").exists())
         self.assertIn(f"redag events {out} --format perfetto", result.stdout)
         self.assertGreater(json.loads(redag("events", "--check", out, "--json").stdout)["traces"][0]["run"]["events"], 500_000)
-        self.expect(redag("simulate", self.cart, "--duration", "700s", "--picture", "always", "--out", out), 0)
+        self.expect(redag("simulate", self.cart, "--duration", "1s", "--out", out), 0)
         self.assertTrue((out / "trace.pftrace").exists())
+        self.expect(redag("simulate", self.cart, "--duration", "700s", "--out", out), 0)
+        self.assertFalse((out / "trace.pftrace").exists(), "it was that of the shorter run")
 
     def test_damage_is_found_at_its_byte(self):
         out = self.results("out", duration="100s")

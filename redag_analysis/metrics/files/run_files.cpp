@@ -19,13 +19,9 @@ Result<RunFiles> RunFiles::create(const FilesOptions &options, const trace::RunI
   const auto path = [&](std::string_view name) { return options.folder + "/" + std::string(name); };
   auto events = trace::EventsWriter::create(path(trace::kEventsFile), run);
   if (!events) return tl::unexpected<Diagnostics>(std::move(events.error()));
-  RunFiles files(options, run, *std::move(events));
-  if (options.jobs) {
-    auto jobs = JobsCsvWriter::create(path(kJobsFile), run.workload);
-    if (!jobs) return tl::unexpected<Diagnostics>(std::move(jobs.error()));
-    files.jobs_.emplace(*std::move(jobs));
-  }
-  if (options.picture == Picture::Never) return files;
+  auto jobs = JobsCsvWriter::create(path(kJobsFile), run.workload);
+  if (!jobs) return tl::unexpected<Diagnostics>(std::move(jobs.error()));
+  RunFiles files(options, run, *std::move(events), *std::move(jobs));
   auto picture = PerfettoWriter::create(path(kPictureFile), *files.run_);
   if (!picture) return tl::unexpected<Diagnostics>(std::move(picture.error()));
   files.picture_.emplace(*std::move(picture));
@@ -34,12 +30,9 @@ Result<RunFiles> RunFiles::create(const FilesOptions &options, const trace::RunI
 
 void RunFiles::add(std::span<const JobEvent> events) {
   events_.add(events);
-  if (jobs_) jobs_->add(events);
+  jobs_.add(events);
   count_ += events.size();
-  if (options_.picture == Picture::Auto && picture_ && count_ > kMostPicturedEvents) {
-    picture_.reset();
-    lacks_picture_ = true;
-  }
+  if (count_ > options_.most_pictured) picture_.reset();
   if (picture_) picture_->add(events);
 }
 
@@ -48,27 +41,19 @@ Diagnostics RunFiles::commit(Time end, std::uint64_t lost_events) {
   const auto keep = [&problems](const Result<void> &written) {
     if (!written) problems.insert(problems.end(), written.error().begin(), written.error().end());
   };
-  const auto remove_stale = [this](std::string_view name) {
-    std::error_code ignored;
-    std::filesystem::remove(path(name), ignored);
-  };
   keep(events_.commit(end, lost_events));
-  if (jobs_) {
-    keep(jobs_->commit());
-  } else {
-    remove_stale(kJobsFile);
-  }
+  keep(jobs_.commit());
   if (picture_) {
     keep(picture_->commit(end));
-  } else {
-    remove_stale(kPictureFile);
+  } else {  // that of an earlier run
+    std::error_code ignored;
+    std::filesystem::remove(path(kPictureFile), ignored);
   }
   return problems;
 }
 
 std::string RunFiles::names() const {
-  std::string names = jobs_ ? std::string(kJobsFile) + ", " : "";
-  names += trace::kEventsFile;
+  std::string names = std::string(kJobsFile) + ", " + std::string(trace::kEventsFile);
   if (picture_) names += ", " + std::string(kPictureFile);
   return names;
 }

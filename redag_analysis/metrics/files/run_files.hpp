@@ -21,21 +21,13 @@
 
 namespace redag::metrics {
 
-/// Which runs get a picture.
-enum class Picture : std::uint8_t {
-  Auto,  // those of at most kMostPicturedEvents events
-  Always,
-  Never,
-};
-
 /// A picture has about 150 bytes for each event; of longer runs it would be most of the results, and more than a
 /// browser opens with ease.
 inline constexpr std::uint64_t kMostPicturedEvents = 500'000;
 
 struct FilesOptions {
-  std::string folder;  // exists; empty: no files
-  bool jobs = true;    // jobs.csv, of long runs most of the results
-  Picture picture = Picture::Auto;
+  std::string folder;                                 // exists; empty: no files
+  std::uint64_t most_pictured = kMostPicturedEvents;  // runs with more events have no picture
 };
 
 class RunFiles {
@@ -51,22 +43,22 @@ class RunFiles {
   /// The names of the files, once they are complete: "jobs.csv, events.redag".
   [[nodiscard]] std::string names() const;
   [[nodiscard]] bool has_picture() const { return picture_.has_value(); }
-  /// True if the run was too long for Picture::Auto.
-  [[nodiscard]] bool lacks_picture() const { return lacks_picture_; }
 
  private:
-  RunFiles(FilesOptions options, const trace::RunInfo &run, trace::EventsWriter events)
-      : options_(std::move(options)), run_(std::make_unique<trace::RunInfo>(run)), events_(std::move(events)) {}
+  RunFiles(FilesOptions options, const trace::RunInfo &run, trace::EventsWriter events, JobsCsvWriter jobs)
+      : options_(std::move(options)),
+        run_(std::make_unique<trace::RunInfo>(run)),
+        events_(std::move(events)),
+        jobs_(std::move(jobs)) {}
 
   [[nodiscard]] std::string path(std::string_view name) const { return options_.folder + "/" + std::string(name); }
 
   FilesOptions options_;
   std::unique_ptr<trace::RunInfo> run_;  // the picture refers to it
   trace::EventsWriter events_;
-  std::optional<JobsCsvWriter> jobs_;
+  JobsCsvWriter jobs_;
   std::optional<PerfettoWriter> picture_;
   std::uint64_t count_ = 0;
-  bool lacks_picture_ = false;
 };
 
 /// Writes all files of a run in memory, and returns their names. Error: everything that failed.

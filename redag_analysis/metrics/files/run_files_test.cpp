@@ -44,14 +44,10 @@ TEST_F(RunFilesTest, ATraceInMemoryIsWrittenAsAWhole) {
 
 TEST_F(RunFilesTest, FewerFilesReplaceThoseOfAnEarlierRun) {
   ASSERT_TRUE(write_run_files({.folder = folder_.string()}, example()));
-  const auto names = write_run_files({.folder = folder_.string(), .picture = Picture::Never}, example());
+  const auto names = write_run_files({.folder = folder_.string(), .most_pictured = 1}, example());
   ASSERT_TRUE(names) << to_string(names.error());
   EXPECT_EQ(*names, "jobs.csv, events.redag");
   EXPECT_FALSE(fs::exists(folder_ / "trace.pftrace"));
-  const auto fewer = write_run_files({.folder = folder_.string(), .jobs = false, .picture = Picture::Never}, example());
-  ASSERT_TRUE(fewer) << to_string(fewer.error());
-  EXPECT_EQ(*fewer, "events.redag");
-  EXPECT_FALSE(fs::exists(folder_ / "jobs.csv"));
 }
 
 TEST_F(RunFilesTest, AFolderThatIsNotThereIsNamed) {

@@ -131,7 +131,7 @@ class Comparing {
       console_.note(made.error());
       return false;
     }
-    const WrittenFiles written = write_session(session, files_options(options_.run, folder));
+    const WrittenFiles written = write_session(session, {.folder = folder});
     console_.note(written.problems);
     all_written_ = all_written_ && written.problems.empty();
     has_picture_ = written.has_picture;
@@ -199,9 +199,9 @@ class Comparing {
           first);
     }
     text += fmt::format(
-        "  {}/{}summary.json, {}\n"
+        "  {}/summary.json, {}\n"
         "      every job; the folders beside it hold the other executors\n",
-        first, options_.run.jobs ? "jobs.csv, " : "", trace::kEventsFile);
+        first, trace::kEventsFile);
     if (options_.run.json) {
       console_.note(text);
     } else {

@@ -85,16 +85,6 @@ void add_result_arguments(CLI::App &app, RunArguments &arguments) {
   add_count(app, "--max-events", arguments.max_events, {1, kMaxEvents},
             "Number of events to check and write; later events count in the summary only")
       ->group(kResultGroup);
-  const Choices<bool> writes{{"always", true}, {"never", false}};
-  add_choice(app, "--jobs", arguments.jobs, writes, "Write jobs.csv, a row for each job, most of a long run's results")
-      ->needs(folder)
-      ->group(kResultGroup);
-  const Choices<metrics::Picture> pictures{
-      {"auto", metrics::Picture::Auto}, {"always", metrics::Picture::Always}, {"never", metrics::Picture::Never}};
-  add_choice(app, "--picture", arguments.picture, pictures,
-             "Write trace.pftrace, the schedule as a picture (auto: of runs with at most 500 000 events)")
-      ->needs(folder)
-      ->group(kResultGroup);
 }
 
 void add_simulator_arguments(CLI::App &app, RunArguments &arguments) {
@@ -284,10 +274,6 @@ std::optional<lab::SessionOptions> session_options(const RunArguments &arguments
     }
   }
   return options;
-}
-
-metrics::FilesOptions files_options(const RunArguments &arguments, const std::string &folder) {
-  return {.folder = folder, .jobs = arguments.jobs, .picture = arguments.picture};
 }
 
 lab::ProgressHook progress_hook(Progress &progress, const Workload &workload, Duration duration) {

@@ -42,8 +42,6 @@ struct RunArguments {
   bool live = false;
   bool json = false;
   std::string folder;
-  bool jobs = true;
-  metrics::Picture picture = metrics::Picture::Auto;
   bool record = false;  // records the run in `folder` while it runs
   std::uint32_t record_mib = static_cast<std::uint32_t>(trace::kMostRecordBytes >> 20U);
   bool force = false;
@@ -87,9 +85,6 @@ void add_thread_arguments(CLI::App &app, RunArguments &arguments);
 /// printed.
 [[nodiscard]] std::optional<lab::SessionOptions> session_options(const RunArguments &arguments, trace::Driver driver,
                                                                  Duration default_duration, Console &console);
-
-/// The files that a run writes into `folder`; "": none.
-[[nodiscard]] metrics::FilesOptions files_options(const RunArguments &arguments, const std::string &folder);
 
 /// Draws `progress` over a session of `duration`: the time, and the DAGs with misses.
 [[nodiscard]] lab::ProgressHook progress_hook(Progress &progress, const Workload &workload, Duration duration);

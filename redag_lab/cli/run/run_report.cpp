@@ -265,7 +265,7 @@ WrittenFiles write_session(lab::Session &session, const metrics::FilesOptions &o
     keep(session.files->commit(session.cut_at.value_or(session.info.end), session.info.lost_events));
     written.names = "summary.json, " + session.files->names();
     written.has_picture = session.files->has_picture();
-    if (session.files->lacks_picture()) {
+    if (!written.has_picture) {
       written.no_picture = fmt::format(
           "no trace.pftrace: the run has more than {0} events\n"
           "('redag events {1} --format perfetto -o {1}/trace.pftrace' makes one)\n",

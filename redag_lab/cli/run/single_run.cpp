@@ -50,7 +50,7 @@ int run_once(const RunArguments &arguments, const std::string &executor, trace::
   const Duration usual = simulated ? lab::sensible_duration(*workload) : kSingleRunDuration;
   std::optional<lab::SessionOptions> options = session_options(arguments, driver, usual, console);
   if (!options) return kExitBad;
-  options->files = files_options(arguments, arguments.folder);
+  options->files.folder = arguments.folder;
   options->keep_trace = false;
 
   if (const auto busy = simulated ? std::nullopt : lab::busy_machine_warning()) console.warn(*busy);
