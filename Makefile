@@ -19,7 +19,7 @@ demo: ## build the program, compare the executors on one workload, and make resu
 	cmake --preset release
 	cmake --build --preset release
 	build/release/bin/redag compare workloads/contention.yaml --executors redag,mte,ste --repeat 3 --duration 3s \
-	  --out results/demo --force
+	  --out results/demo
 	build/release/bin/redag report results/demo
 
 test: ## build everything and run all tests

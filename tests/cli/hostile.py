@@ -139,7 +139,6 @@ class Combinations(Case):
         self.refuse("compare", self.cart, "--simulate", "--affinity", "0", says="excludes")
         self.refuse("compare", self.cart, "--overhead-release", "5us", says="--overhead-release requires --simulate")
         self.refuse("analyze", self.cart, "--sensitivity", "--executor", "ste", says="available for ReDAG-RT only")
-        self.refuse("simulate", self.cart, "--force", says="--force requires --out")
         self.refuse("analyze", "--methods", "--explain", "a.x", says="FILE is required")
         self.refuse("top", "--list", "5", says="excludes")
         self.refuse("simulate", self.cart, "--duration", "1s", "--duration", "2s", says="--duration is given more than once")

@@ -46,7 +46,7 @@ void commands_target(std::string_view input) {
   for (const char *executor : {"redag-none", "redag-cooperative", "mte", "ste", "static", "events", "cbg"}) {
     REDAG_CHECK(answers({"simulate", file, "--executor", executor, "--duration", duration, "--json"}), executor);
   }
-  REDAG_CHECK(answers({"simulate", file, "--duration", duration, "--out", results, "--force"}), "simulate");
+  REDAG_CHECK(answers({"simulate", file, "--duration", duration, "--out", results}), "simulate");
   REDAG_CHECK(answers({"events", "--check", results}), "events --check: what was simulated is lawful");
   REDAG_CHECK(answers({"report", results}), "report");
   REDAG_CHECK(answers({"analyze", file, "--json"}), "analyze");

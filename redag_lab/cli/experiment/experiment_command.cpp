@@ -38,7 +38,6 @@ struct Settings {
   std::string run_workload;
   experiment::Shard shard;
   std::uint32_t jobs = 0;  // 0: one per processor
-  bool force = false;
 };
 
 /// Executes a run in any world; `program` is the one for ROS 2.
@@ -86,7 +85,7 @@ class Run {
                      "give each machine a plan and a folder of its own");
       return kExitBad;
     }
-    if (!ok(prepare_folder(settings_.folder, settings_.force), console_)) return kExitBad;
+    if (!ok(prepare_folder(settings_.folder), console_)) return kExitBad;
     const auto known = [this](std::uint64_t unit, const std::string &result) -> Result<void> {
       if (unit < done_.size() && done_[unit]) return {};
       if (Result<void> added = experiment_.add(unit, result); !added) return added;
@@ -178,7 +177,6 @@ Action add_experiment(CLI::App &app) {
   app.add_option("--out", settings->folder, "Folder for the results; an experiment that was killed resumes there")
       ->type_name("DIR")
       ->required();
-  app.add_flag("--force", settings->force, "Write into a folder that holds other files");
   add_count(app, "-j,--jobs", settings->jobs, {1, kMaxJobs},
             "Number of parallel runs (default: one for each processor)")
       ->default_str("");

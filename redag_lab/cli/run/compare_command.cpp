@@ -127,7 +127,7 @@ class Comparing {
   bool write(lab::Session &session, const lab::Variant &variant, std::uint32_t repetition) {
     if (options_.run.folder.empty()) return true;
     const std::string folder = fmt::format("{}/{}/repetition-{}", options_.run.folder, variant.name, repetition + 1);
-    if (const Result<void> made = prepare_folder(folder, options_.run.force); !made) {
+    if (const Result<void> made = prepare_folder(folder); !made) {
       console_.note(made.error());
       return false;
     }

@@ -75,11 +75,8 @@ void add_workload_arguments(CLI::App &app, RunArguments &arguments, const char *
 void add_result_arguments(CLI::App &app, RunArguments &arguments) {
   app.add_flag("--json", arguments.json, "Write one JSON document, and nothing else, to standard output")
       ->group(kResultGroup);
-  CLI::Option *folder = app.add_option("--out", arguments.folder, "Folder for the result files; created if missing")
-                            ->type_name("DIR")
-                            ->group(kResultGroup);
-  app.add_flag("--force", arguments.force, "Write into a folder that holds other files")
-      ->needs(folder)
+  app.add_option("--out", arguments.folder, "Folder for the result files; created if missing")
+      ->type_name("DIR")
       ->group(kResultGroup);
   app.add_flag("--check", arguments.check, "Exit with status 1 if a deadline was missed")->group(kResultGroup);
   add_count(app, "--max-events", arguments.max_events, {1, kMaxEvents},
@@ -268,7 +265,7 @@ std::optional<lab::SessionOptions> session_options(const RunArguments &arguments
   if (!arguments.folder.empty()) {
     if (arguments.record) options.record = fmt::format("{}/{}", arguments.folder, trace::kEventsFile);
     options.record_bytes = std::uint64_t{arguments.record_mib} << 20U;
-    if (const Result<void> made = prepare_folder(arguments.folder, arguments.force); !made) {
+    if (const Result<void> made = prepare_folder(arguments.folder); !made) {
       console.note(made.error());
       return std::nullopt;
     }

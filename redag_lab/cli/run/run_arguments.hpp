@@ -44,7 +44,6 @@ struct RunArguments {
   std::string folder;
   bool record = false;  // records the run in `folder` while it runs
   std::uint32_t record_mib = static_cast<std::uint32_t>(trace::kMostRecordBytes >> 20U);
-  bool force = false;
   bool check = false;
   bool all_tasks = false;
 };

@@ -7,7 +7,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -21,7 +20,6 @@
 #include "redag/loader/workload_yaml_node.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/output_file.hpp"
-#include "redag_lab/run/variant.hpp"
 
 namespace redag::cli {
 namespace {
@@ -51,11 +49,6 @@ Result<std::string> read_standard_input() {
     }
   }
   return trace::file_error("<stdin>", 0, fmt::format("the file is longer than {} bytes", kMaxWorkloadBytes));
-}
-
-// True if the text consists of digits, such as "007" of "mte_007".
-bool is_number(std::string_view text) {
-  return !text.empty() && std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
 }
 
 }  // namespace
@@ -116,44 +109,13 @@ Result<std::vector<std::string>> find_traces(const std::string &place) {
   return files;
 }
 
-bool is_result_name(std::string_view name) {
-  // A killed command can leave files that end in ".tmp.<pid>".
-  if (const std::size_t at = name.rfind(".tmp."); at != std::string_view::npos && is_number(name.substr(at + 5))) {
-    name = name.substr(0, at);
-  }
-  constexpr std::array<std::string_view, 13> kNames = {
-      "jobs.csv",        "summary.json",   "trace.pftrace",   "events.redag", "workload.yaml",
-      "comparison.json", "comparison.csv", "comparison.html", "report.html",  "check.json",
-      "units.csv",       "results.csv",    "results.json"};
-  if (std::find(kNames.begin(), kNames.end(), name) != kNames.end()) return true;
-  // Folders of a comparison (executors, and repetitions below them), and the files of `generate`.
-  const std::vector<std::string> &executors = lab::variant_names();
-  if (std::find(executors.begin(), executors.end(), name) != executors.end()) return true;
-  const auto is_numbered = [name](std::string_view prefix, std::string_view suffix) {
-    return name.size() > prefix.size() + suffix.size() && name.substr(0, prefix.size()) == prefix &&
-           name.substr(name.size() - suffix.size()) == suffix &&
-           is_number(name.substr(prefix.size(), name.size() - prefix.size() - suffix.size()));
-  };
-  if (name.starts_with("units-") && name.ends_with(".csv")) return true;  // of a share of an experiment
-  return is_numbered("repetition-", "") || is_numbered("workload-", ".yaml") || is_numbered("violation-", ".yaml") ||
-         is_numbered("events.", ".redag");  // of killed runs
-}
-
-Result<void> prepare_folder(const std::string &path, bool force) {
+Result<void> prepare_folder(const std::string &path) {
   std::error_code error;
   fs::create_directories(path, error);
   if (error) return trace::file_error(path, 0, fmt::format("cannot create the folder: {}", error.message()));
   if (::access(path.c_str(), W_OK | X_OK) != 0) {
     return trace::file_error(path, 0, fmt::format("cannot write into the folder: {}", std::strerror(errno)));
   }
-  if (force) return {};
-  for (fs::directory_iterator entry(path, error), end; !error && entry != end; entry.increment(error)) {
-    const std::string name = entry->path().filename().string();
-    if (is_result_name(name)) continue;
-    return trace::file_error(path, 0, fmt::format("the folder holds '{}', which is not a result of redag", name),
-                             "choose another folder, or write beside it with --force");
-  }
-  if (error) return trace::file_error(path, 0, fmt::format("cannot list the folder: {}", error.message()));
   return {};
 }
 

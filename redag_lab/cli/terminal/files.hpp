@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Files of commands: reading a workload ("-" is standard input), writing one text file, and result folders. Result
-// folders are created if missing and never mixed with foreign files. Not thread-safe.
+// folders are created if missing. Not thread-safe.
 #pragma once
 
 #include <string>
@@ -26,14 +26,11 @@ namespace redag::cli {
 [[nodiscard]] Result<void> check_output(const std::string &path);
 
 /// Prepares a folder for results, creating it and its parents if missing. Error: the folder cannot be created or
-/// written, or holds a file that this program does not write, by name (unless `force`). Nothing is deleted.
-[[nodiscard]] Result<void> prepare_folder(const std::string &path, bool force);
+/// written. Nothing is deleted.
+[[nodiscard]] Result<void> prepare_folder(const std::string &path);
 
 /// Returns the traces at a place, sorted: the file itself, or every events.redag in the folder and
 /// below. Error: none found.
 [[nodiscard]] Result<std::vector<std::string>> find_traces(const std::string &place);
-
-/// True if a command writes a file or folder of this name into a result folder.
-[[nodiscard]] bool is_result_name(std::string_view name);
 
 }  // namespace redag::cli

@@ -46,16 +46,5 @@ TEST(Variant, RejectsUnknownAndRepeatedNames) {
   EXPECT_EQ(lab::parse_variants("ste,redag-none")->size(), 2U);
 }
 
-TEST(ResultName, IsKnownEvenHalfWritten) {
-  EXPECT_TRUE(is_result_name("summary.json"));
-  EXPECT_TRUE(is_result_name("events.redag.tmp.4711"));
-  EXPECT_TRUE(is_result_name("redag-os"));
-  EXPECT_TRUE(is_result_name("repetition-12"));
-  EXPECT_TRUE(is_result_name("workload-7.yaml"));
-  for (const char *name : {"thesis.tex", "summary.json.bak", "redagging", "mtefoo", "repetition-", "jobs.csv.tmp.x"}) {
-    EXPECT_FALSE(is_result_name(name)) << name;
-  }
-}
-
 }  // namespace
 }  // namespace redag::cli
