@@ -231,7 +231,7 @@ class SchemaTest(unittest.TestCase):
 
     def test_robots(self):
         jsonschema.Draft7Validator.check_schema(ROBOT_SCHEMA)
-        files = [ROOT / "examples" / name for name in ("robot/cart.yaml", "robot/brake.yaml")]
+        files = [ROOT / "examples" / name for name in ("robot/cart.yaml",)]
         texts = [file.read_text(encoding="utf-8") for file in files]
         page = (ROOT / "docs" / "robot.md").read_text(encoding="utf-8")
         blocks = [part.split("```")[0] for part in page.split("```yaml")[1:]]

@@ -44,14 +44,6 @@ struct TaskOf {
   std::string name;         // "process.dag.task"
 };
 
-/// Data that cross from one process to another: each job of `from` that ends releases one of `to`.
-struct Link {
-  TaskOf from;
-  TaskOf to;               // a timer task without predecessors, of the same period
-  Duration transport = 0;  // the longest time from the end of `from` to the release of `to`
-  Place place;
-};
-
 /// Processor time that the kernel grants a thread, and takes away when it is used up (SCHED_DEADLINE).
 struct Reservation {
   Duration budget = 0;
@@ -90,7 +82,6 @@ struct Robot {
   PolicyKind policy = PolicyKind::RateMonotonic;
   std::vector<CpuSet> cpu_sets;  // at least one
   std::vector<Process> processes;
-  std::vector<Link> links;
   std::vector<Threads> threads;
 };
 

@@ -43,13 +43,12 @@ class RobotReader : private yaml::ValueReader {
       : ValueReader(file), root_(root), options_(options) {}
 
   Result<LoadedRobot> run() {
-    if (check_map(root_, "a robot", {"robot", "policy", "cpus", "cpu_sets", "processes", "links", "threads"})) {
+    if (check_map(root_, "a robot", {"robot", "policy", "cpus", "cpu_sets", "processes", "threads"})) {
       take(root_, "robot", robot_.name, [this](const Node &node, auto key) { return text(node, key); });
       take(root_, "policy", robot_.policy,
            [this](const Node &node, auto key) { return one_of<PolicyKind>(node, key, kPolicies); });
       read_cpu_sets();
       read_list("processes", [this](const Node &node) { read_process(node); });
-      read_list("links", [this](const Node &node) { read_link(node); });
       read_list("threads", [this](const Node &node) { read_threads(node); });
       if (robot_.processes.empty() && !is_broken_) {
         error(root_, "the robot has no processes", "add one under 'processes:'");
@@ -252,64 +251,6 @@ class RobotReader : private yaml::ValueReader {
     error(node, fmt::format("there is no task {}", in_quotes(*name)),
           did_you_mean(*name, names, "write PROCESS.DAG.TASK, such as 'base.control.pid'"));
     return std::nullopt;
-  }
-
-  // ---- links ----
-
-  void read_link(const Node &node) {
-    Link link;
-    link.place = place_of(node);
-    const auto task = [this](const Node &at, auto key) { return read_task(at, key); };
-    const auto time = [this](const Node &at, auto key) { return duration_from_zero(at, key); };
-    if (check_map(node, "a link", {"from", "to", "transport"}) &&
-        must_have(node, "the link has", {"from", "to", "transport"},
-                  "write {from: PROCESS.DAG.TASK, to: PROCESS.DAG.TASK, transport: TIME}") &&
-        take(node, "from", link.from, task) && take(node, "to", link.to, task) &&
-        take(node, "transport", link.transport, time) && check_link(*find(node, "to"), link)) {
-      robot_.links.push_back(std::move(link));
-    }
-  }
-
-  bool check_link(const Node &at, const Link &link) {
-    const Workload &sender = robot_.processes[link.from.process].workload;
-    const Workload &receiver = robot_.processes[link.to.process].workload;
-    const Task &from = *flatten(sender)[link.from.task.value].task;
-    const TaskRef ref = flatten(receiver)[link.to.task.value];
-    const Task &to = *ref.task;
-    const auto refuse = [&](std::string message, std::string hint) {
-      error(at, std::move(message), std::move(hint));
-      return false;
-    };
-    if (link.from.process == link.to.process) {
-      return refuse("the link stays within a process", "write an edge in its workload: 'after:'");
-    }
-    if (to.activation != Activation::Timer || !to.predecessors.empty()) {
-      return refuse(fmt::format("task '{}' has predecessors in its process", link.to.name),
-                    "add a task without predecessors that receives the data");
-    }
-    if (std::any_of(robot_.links.begin(), robot_.links.end(),
-                    [&](const Link &other) { return other.to.name == link.to.name; })) {
-      return refuse(fmt::format("task '{}' has the data of another link already", link.to.name),
-                    "add a task for the data of each");
-    }
-    if (to.jitter != 0) {
-      return refuse(fmt::format("task '{}' has a jitter, which would follow from the link", link.to.name),
-                    "remove 'jitter:' in its workload");
-    }
-    const Dag &dag = receiver.dags[ref.dag.value];
-    for (const Task &task : dag.tasks) {
-      const bool waits = std::any_of(task.predecessors.begin(), task.predecessors.end(),
-                                     [&](std::uint32_t p) { return &dag.tasks[p] == &to; });
-      if (!waits || task.activation == Activation::Data || task.period != to.period) continue;
-      return refuse(fmt::format("timer task '{}' of the same period waits for '{}', but nothing synchronises it with "
-                                "data of another process",
-                                task.name, link.to.name),
-                    "make it a data task: 'activation: data'");
-    }
-    if (from.period == to.period) return true;
-    return refuse(fmt::format("task '{}' has the period {}, and '{}', whose data release it, has {}", link.to.name,
-                              format_duration(to.period), link.from.name, format_duration(from.period)),
-                  fmt::format("write 'period: {}' in its workload", format_duration(from.period)));
   }
 
   // ---- threads ----

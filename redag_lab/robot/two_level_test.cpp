@@ -200,15 +200,9 @@ Workload random_process(Rng &rng, double most_load, double groups) {
 
 struct Observed {
   std::uint64_t jobs = 0;
-  std::uint64_t crossed = 0;  // of these, jobs whose data came from another process
   std::uint64_t high_modes = 0;
   std::string violation;
 };
-
-bool is_linked(const Robot &robot, std::size_t process, TaskId task) {
-  return std::any_of(robot.links.begin(), robot.links.end(),
-                     [&](const Link &link) { return link.to.process == process && link.to.task == task; });
-}
 
 // Simulates the processes, and compares each response with the bound of the task in the union. `lowered`: how far the
 // threads for releases are below their priority.
@@ -225,8 +219,6 @@ Observed observe(const Robot &robot, const std::vector<runtime::PriorityBand> &b
   std::vector<Timer> timers;
   std::vector<int> of_releases;         // by process
   std::vector<std::size_t> first_task;  // of the process in the union
-  std::vector<std::size_t> first_dag;
-  std::size_t dags = 0;
   std::size_t tasks = 0;
   Duration longest = 0;
   for (std::size_t p = 0; p < robot.processes.size(); ++p) {
@@ -247,56 +239,30 @@ Observed observe(const Robot &robot, const std::vector<runtime::PriorityBand> &b
       longest = std::max(longest, period);
     }
     for (const TaskRef &ref : processes.back().tasks()) {
-      if (ref.task->activation != Activation::Timer || is_linked(robot, p, ref.id)) continue;
+      if (ref.task->activation != Activation::Timer) continue;
       const bool is_free = ref.task->phase != Phase::Common;
       const Time first = is_free ? below(ref.task->period) : ref.task->offset + offsets[ref.dag.value];
       timers.push_back(Timer{p, ref.id, first, ref.task->period});
     }
     first_task.push_back(tasks);
     tasks += workload.task_count();
-    first_dag.push_back(dags);
-    dags += workload.dags.size();
   }
-  struct Message {
-    TaskOf to;
-    Time origin;
-    Time arrival;
-  };
-  std::vector<Message> messages;
   Observed observed;
   std::uint64_t sequence = 0;
   for (Time now = 0; now < 12 * longest; now += kTick) {
     for (std::size_t p = 0; p < processes.size(); ++p) {
       processes[p].complete(now, [&](const SimulatedProcess::Job &job) {
-        for (const Link &link : robot.links) {
-          if (link.from.process != p || link.from.task != job.task) continue;
-          const auto longest_ticks = static_cast<std::uint32_t>(link.transport / kTick);
-          const std::uint32_t ticks =
-              testing::chance(rng, 0.5) ? longest_ticks : testing::between(rng, 0, longest_ticks);
-          messages.push_back(Message{link.to, job.origin, now + ticks * kTick});
-        }
-        // Of data of another process, the bound of the DAG counts from the release in the first process on.
-        const TaskRef &task = processes[p].tasks()[job.task.value];
-        const bool is_crossed = p == robot.processes.size() - 1 && !robot.links.empty();
-        const bool is_sink = is_crossed && task.task->activation == Activation::Data;
-        const analysis::Tightest &tightest =
-            is_sink ? report.dags[first_dag[p] + task.dag.value] : report.tasks[first_task[p] + job.task.value];
+        const analysis::Tightest &tightest = report.tasks[first_task[p] + job.task.value];
         const std::optional<Duration> bound = tightest.response;
         if (!bound) return;
         ++observed.jobs;
-        if (is_crossed) ++observed.crossed;
-        const Duration response = now - (is_crossed ? job.origin : job.release);
+        const Duration response = now - job.release;
         if (response > *bound + static_cast<Duration>(tasks) && observed.violation.empty()) {
           observed.violation = fmt::format("process {}, task {}: {} > {} by {}", p, job.task.value, response, *bound,
                                            tightest.method->name);
         }
       });
     }
-    std::erase_if(messages, [&](const Message &message) {
-      if (message.arrival > now) return false;
-      processes[message.to.process].release(message.to.task, message.origin, now);
-      return true;
-    });
     for (Timer &timer : timers) {
       if (timer.next > now) continue;
       processes[timer.process].expect(timer.task, timer.next, of_releases[timer.process], sequence);
@@ -322,45 +288,6 @@ Robot random_robot(Rng &rng, std::vector<int> cpus, double most_load = 0.5, doub
     robot.processes.push_back(std::move(process));
   }
   return robot;
-}
-
-// Data have to arrive within a period.
-constexpr double kLoadWithLinks = 0.2;
-
-// Adds a process whose DAGs receive data of the others, each from a task of a DAG with one timer. Some join them with a
-// timer of the process.
-void add_receiver(Rng &rng, Robot &robot) {
-  std::vector<testing::TestTask> tasks;
-  std::vector<Dag> dags;
-  std::uint32_t next_task = 0;
-  const std::size_t receiver = robot.processes.size();
-  for (std::size_t p = 0; p < receiver; ++p) {
-    const Workload &workload = robot.processes[p].workload;
-    for (const TaskRef &ref : flatten(workload)) {
-      const std::vector<Task> &siblings = workload.dags[ref.dag.value].tasks;
-      const auto timers = std::count_if(siblings.begin(), siblings.end(),
-                                        [](const Task &task) { return task.activation == Activation::Timer; });
-      if (timers != 1 || dags.size() == 2 || testing::chance(rng, 0.5)) continue;
-      const Duration period = ref.task->period;
-      const auto wcet = [&] { return testing::between(rng, 1, 2) * kTick; };
-      std::vector<testing::TestTask> members = {
-          {.name = "in", .period = period, .wcet = wcet(), .deadline = 4 * period},
-          {.name = "out", .wcet = wcet(), .after = {0}}};
-      if (testing::chance(rng, 0.5)) {
-        members.push_back({.name = "own", .period = period, .wcet = kTick, .deadline = 4 * period});
-        members[1].after = {0, 2};
-      }
-      dags.push_back(testing::tick_dag(fmt::format("d{}", dags.size()), members));
-      robot.links.push_back(
-          Link{{p, ref.id, "from"}, {receiver, TaskId(next_task), "to"}, testing::between(rng, 0, 3) * kTick, {}});
-      next_task += static_cast<std::uint32_t>(members.size());
-    }
-  }
-  if (dags.empty()) return;
-  Process process;
-  process.name = "receiver";
-  process.workload = testing::make_workload(std::move(dags), 2, PreemptionMode::Os);
-  robot.processes.push_back(std::move(process));
 }
 
 // The priorities that the executors of the processes have when they agree, by level.
@@ -449,46 +376,6 @@ TEST(RobotUnionBounds, CountEachHolderThatRunsForAMoreUrgentJob) {
   const analysis::Tightest bound = analysed(robot).report.tasks.back();
   ASSERT_TRUE(bound.response);
   EXPECT_GE(*bound.response, 12 * kTick);
-}
-
-// Data that cross to another process, and its bounds from the release behind them on.
-TEST(RobotUnionBounds, HoldForDataOfOtherProcesses) {
-  std::uint64_t robots = 0;
-  std::uint64_t crossed = 0;
-  const std::uint64_t count = testing::how_many(1500);
-  for (std::uint64_t seed = 1; seed <= count; ++seed) {
-    Rng rng(seed);
-    Robot robot = random_robot(rng, testing::chance(rng, 0.3) ? std::vector{0} : std::vector{0, 1}, kLoadWithLinks);
-    add_receiver(rng, robot);
-    if (robot.links.empty() || !union_of(robot)) continue;  // too much load for the links
-    ++robots;
-    const auto [bands, report] = analysed(robot);
-    for (std::uint64_t run = 0; run < 3; ++run) {
-      const Observed observed = observe(robot, bands, report, robot.cpu_sets[0].cpus.size(), seed * 1000 + run);
-      crossed += observed.crossed;
-      ASSERT_EQ(observed.violation, "") << "seed " << seed << ", run " << run;
-    }
-  }
-  RecordProperty("robots", static_cast<int>(robots));
-  RecordProperty("crossed", static_cast<int>(crossed));
-  EXPECT_GT(robots, count / 40);
-  EXPECT_GT(crossed, robots * 20);
-}
-
-// The same, with bounds that count from the release of the data: they do not hold.
-TEST(RobotUnionBounds, BreakWhereDataAreTakenToBeThere) {
-  std::uint64_t violations = 0;
-  for (std::uint64_t seed = 1; seed <= 400; ++seed) {
-    Rng rng(seed);
-    Robot robot = random_robot(rng, {0, 1}, kLoadWithLinks);
-    add_receiver(rng, robot);
-    if (robot.links.empty() || !union_of(robot)) continue;
-    Robot without = robot;
-    without.links.clear();
-    const Analysed analysed_without = analysed(without);
-    if (!observe(robot, analysed_without.bands, analysed_without.report, 2, seed).violation.empty()) ++violations;
-  }
-  EXPECT_GT(violations, 5U);
 }
 
 // A robot in which jobs of some processes begin HI mode.

@@ -12,7 +12,6 @@
 #include "redag/loader/validate.hpp"
 #include "redag/sched/policy.hpp"
 #include "redag/threads/setup.hpp"
-#include "redag_lab/robot/links.hpp"
 #include "redag_lab/robot/reservation.hpp"
 
 namespace redag::robot {
@@ -84,7 +83,6 @@ class Union {
     if (has_own_order_) fix_priorities();
     Diagnostics found = validate(workload_, options);
     if (has_errors(found)) return tl::unexpected<Diagnostics>(std::move(found));
-    if (const Result<void> linked = add_links(); !linked) return tl::unexpected<Diagnostics>(linked.error());
     return LoadedWorkload{std::move(workload_), std::move(found), true};
   }
 
@@ -128,34 +126,18 @@ class Union {
     ++next_executor_;
   }
 
-  // Nothing synchronises the timers of a process with data of others, or with threads that execute a task.
+  // Nothing synchronises the timers of a process with threads that execute a task.
   void set_phases() {
     std::vector<Task *> tasks;
     for (Dag &dag : workload_.dags) {
       for (Task &task : dag.tasks) tasks.push_back(&task);
     }
-    const std::vector<TaskRef> refs = flatten(workload_);
     for (std::size_t p = 0; p < robot_.processes.size(); ++p) {
       for (std::size_t t = 0; t < robot_.processes[p].workload.task_count(); ++t) {
         Task &task = *tasks[first_task_[p] + t];
         const bool is_source = task.activation == Activation::Timer && task.predecessors.empty();
         if (is_source && task.phase == Phase::Common && is_of_threads(robot_, p, TaskId(t)))
           set_free(task, Phase::Unknown);
-      }
-    }
-    for (const Link &link : robot_.links)
-      set_free(*tasks[first_task_[link.to.process] + link.to.task.value], Phase::Unknown);
-    // Data of events come by events, over as many links as there are.
-    for (bool changed = true; changed;) {
-      changed = false;
-      for (const Link &link : robot_.links) {
-        Task &to = *tasks[first_task_[link.to.process] + link.to.task.value];
-        const Dag &dag = workload_.dags[refs[first_task_[link.from.process] + link.from.task.value].dag.value];
-        const bool has_events = std::any_of(dag.tasks.begin(), dag.tasks.end(),
-                                            [](const Task &task) { return task.phase == Phase::Event; });
-        if (!has_events || to.phase == Phase::Event) continue;
-        to.phase = Phase::Event;
-        changed = true;
       }
     }
   }
@@ -311,15 +293,6 @@ class Union {
     for (Dag &dag : workload_.dags) {
       for (Task &task : dag.tasks) task.priority = -levels_[id++];
     }
-  }
-
-  // Data of other processes come late. Nothing bounds them before all wcets are measured.
-  Result<void> add_links() {
-    const std::vector<TaskRef> tasks = flatten(workload_);
-    const bool is_measured =
-        std::all_of(tasks.begin(), tasks.end(), [](const TaskRef &ref) { return ref.task->wcet > 0; });
-    if (!is_measured) return {};
-    return set_jitter_of_links(robot_, first_task_, analysis::platform_of(workload_), workload_);
   }
 
   const Robot &robot_;

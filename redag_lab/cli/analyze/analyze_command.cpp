@@ -239,8 +239,7 @@ int analyze_file(const AnalyzeOptions &options, Console &console) {
                   fmt::format("leave out {} or --executor", ours));
     return kExitBad;
   }
-  const std::optional<Workload> workload =
-      load_configured(options.analysis.run, console, {.waits = true}, options.sensitivity ? "--sensitivity" : nullptr);
+  const std::optional<Workload> workload = load_configured(options.analysis.run, console, {.waits = true});
   if (!workload || !takes_arguments({*lab::parse_variant(options.executor)}, options.analysis.run, console))
     return kExitBad;
   const InterruptGuard guard;

@@ -108,29 +108,15 @@ void add_thread_arguments(CLI::App &app, RunArguments &arguments) {
 }
 
 std::optional<Workload> load_configured(const RunArguments &arguments, Console &console, LoadOptions options,
-                                        const char *changed_by, std::string *source) {
+                                        std::string *source) {
   Result<robot::Input> input = load_workload_or_robot(arguments.file, options, source);
   if (!input) {
     console.note(input.error());
     return std::nullopt;
   }
-  const bool has_links = input->robot && !input->robot->links.empty();
   console.note(input->loaded.warnings);
   Workload workload = std::move(input->loaded.workload);
   const bool is_unchanged = !arguments.policy && !arguments.ties && !arguments.preemption && arguments.workers == 0;
-  // What is said about the data of other processes was found for the platform of the file.
-  const bool has_overheads = arguments.calibration || arguments.overheads != sim::Overheads{};
-  if (has_links && changed_by != nullptr) {
-    console.error(
-        fmt::format("{} changes tasks, and the jitter that follows from the robot's links depends on them", changed_by),
-        "state the jitter of the tasks in place of the links");
-    return std::nullopt;
-  }
-  if (has_links && (!is_unchanged || has_overheads)) {
-    console.error("the links of this robot hold for the platform in its file, and no options can change it",
-                  "change the file, or state the jitter of the tasks in place of the links");
-    return std::nullopt;
-  }
   if (is_unchanged) return workload;
   if (arguments.policy) workload.policy = *arguments.policy;
   if (arguments.ties) workload.ties = *arguments.ties;
@@ -152,7 +138,7 @@ std::optional<Workload> load_configured(const RunArguments &arguments, Console &
 
 std::optional<Workload> load_without_clusters(const RunArguments &arguments, const char *command, Console &console,
                                               std::string *source) {
-  std::optional<Workload> workload = load_configured(arguments, console, {.waits = true}, command, source);
+  std::optional<Workload> workload = load_configured(arguments, console, {.waits = true}, source);
   if (!workload) return std::nullopt;
   for (const Result<void> &one : {refuse_clusters(*workload, command), refuse_separate_modes(*workload, command)}) {
     if (one) continue;

@@ -61,11 +61,9 @@ void add_simulator_arguments(CLI::App &app, RunArguments &arguments);
 void add_thread_arguments(CLI::App &app, RunArguments &arguments);
 
 /// Returns the workload of `arguments.file` with the changes of the command line, and prints warnings and errors.
-/// Returns nothing if the workload cannot be run. `changed_by` names a command that changes tasks; it cannot use a
-/// robot with links, whose jitter depends on all tasks. Leaves the text of the file in `source`, if that is given.
+/// Returns nothing if the workload cannot be run. Leaves the text of the file in `source`, if that is given.
 [[nodiscard]] std::optional<Workload> load_configured(const RunArguments &arguments, Console &console,
-                                                      LoadOptions options = {}, const char *changed_by = nullptr,
-                                                      std::string *source = nullptr);
+                                                      LoadOptions options = {}, std::string *source = nullptr);
 /// The same for a command that changes tasks and cannot use a workload with clusters.
 [[nodiscard]] std::optional<Workload> load_without_clusters(const RunArguments &arguments, const char *command,
                                                             Console &console, std::string *source = nullptr);

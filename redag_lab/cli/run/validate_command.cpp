@@ -71,9 +71,8 @@ Json facts_json(const std::string &name, const Facts &facts) {
 std::string describe(const robot::Robot &robot) {
   std::size_t cpus = 0;
   for (const robot::CpuSet &set : robot.cpu_sets) cpus += set.cpus.size();
-  return fmt::format("robot of {} on {}, {}, {} of threads: ", plural(robot.processes.size(), "process", "processes"),
-                     plural(cpus, "processor"), plural(robot.links.size(), "link"),
-                     plural(robot.threads.size(), "entry", "entries"));
+  return fmt::format("robot of {} on {}, {} of threads: ", plural(robot.processes.size(), "process", "processes"),
+                     plural(cpus, "processor"), plural(robot.threads.size(), "entry", "entries"));
 }
 
 int validate_files(const ValidateOptions &options, Console &console) {
