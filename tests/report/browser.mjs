@@ -141,13 +141,10 @@ await test('dark: figures and page follow the system, and the reader', async () 
   await close();
 });
 
-await test('phone: neither the page nor a table is wider than the screen', async () => {
+await test('phone: the page is not wider than the screen', async () => {
   for (const name of Object.keys(FIGURES)) {
     const {page, problems, close} = await open(name, PHONE);
     await fits(page);
-    const cut = await page.evaluate(() => [...document.querySelectorAll('.table')].filter((node) => node.scrollWidth > node.clientWidth + 1)
-      .map((node) => node.getAttribute('aria-label')));
-    assert.deepEqual(cut, [], name);
     await assertAllDrawn(page, FIGURES[name]);
     if (['comparison', 'single', 'experiment', 'perception'].includes(name)) await page.screenshot({path: shot(`${name}-phone`), fullPage: true});
     none(problems);

@@ -1,13 +1,12 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Tables that a reader can sort, by click or key. Long ones show their first rows until the reader asks for all. On a
-// phone a row becomes a card (page.css). The roles are explicit, because cards are no table to browsers.
+// Tables that a reader can sort, by click or key. Long ones show their first rows until the reader asks for all.
 
 const MOST_ROWS_AT_ONCE = 40;
 const orders = new Map();  // caption -> what the reader chose, kept when the table is made again
 
-/** `kind`: "text" is on the left, "minor" is not shown on a phone. */
+/** `kind`: "text" is on the left, "minor" is not shown on a narrow live page. */
 const column = (title, help, kind = '') => ({title, help, kind});
 
 // A cell's content is a string, a node, or {text, kind, title, sort}.
@@ -34,10 +33,10 @@ function rowOf(columns, row, isSorted) {
     const {text, kind = '', title} = contentOf(content);
     const tag = i === 0 ? 'th' : 'td';
     return element([tag, kind, columns[i].kind].filter(Boolean).join('.'), {
-      title, 'data-label': columns[i].title, role: i === 0 ? 'rowheader' : 'cell', scope: i === 0 ? 'row' : null,
+      title, scope: i === 0 ? 'row' : null,
     }, text);
   });
-  return element(row.first && !isSorted ? 'tr.group' : 'tr', {role: 'row', 'aria-current': row.current ? 'true' : null}, ...cells);
+  return element(row.first && !isSorted ? 'tr.group' : 'tr', {'aria-current': row.current ? 'true' : null}, ...cells);
 }
 
 /**
@@ -47,12 +46,12 @@ function rowOf(columns, row, isSorted) {
 function table(caption, columns, rows, {most = MOST_ROWS_AT_ONCE, total = 0} = {}) {
   if (!orders.has(caption)) orders.set(caption, {at: null, down: false, clicks: 0, all: false});
   const order = orders.get(caption);
-  const body = element('tbody', {role: 'rowgroup'});
+  const body = element('tbody');
   const more = element('div');
-  const heads = columns.map(({title, help, kind}, i) => element(['th', kind].filter(Boolean).join('.'), {scope: 'col', role: 'columnheader'},
+  const heads = columns.map(({title, help, kind}, i) => element(['th', kind].filter(Boolean).join('.'), {scope: 'col'},
     element('button.sort', {type: 'button', title: help, onclick: () => sortBy(i)}, title)));
-  const frame = element('div.table', {tabindex: '0', role: 'region', 'aria-label': caption}, element('table', {role: 'table', 'aria-label': caption},
-    element('thead', {role: 'rowgroup'}, element('tr', {role: 'row'}, ...heads)), body));
+  const frame = element('div.table', {tabindex: '0', role: 'region', 'aria-label': caption}, element('table', {'aria-label': caption},
+    element('thead', {}, element('tr', {}, ...heads)), body));
   const box = element('div', {'data-table': caption}, frame, more);
 
   // Numbers begin with the largest one, names with the first. The third click gives the order as listed.

@@ -14,24 +14,6 @@ function missCell(jobs) {
   });
 }
 
-/** Returns a bar from the median to the maximum on a track that ends at the deadline, with the bound as a tick. */
-function meter(t, response, deadline, bound, colour) {
-  if (!response || !deadline) return '';
-  const most = Math.max(deadline, response.max_ns, bound || 0) * 1.04;
-  const x = (ns) => (100 * ns / most).toFixed(2);
-  const title = `p50 ${formatTime(response.p50_ns)}, p99 ${formatTime(response.p99_ns)}, max ${formatTime(response.max_ns)}; `
-    + `deadline ${formatTime(deadline)}${bound ? `, bound ${formatTime(bound)}` : ''}`;
-  const bar = (ns, opacity) => svgElement('rect', {x: 0, y: 5, width: x(ns), height: 6, fill: ns > deadline ? t.missed : colour, opacity});
-  const tick = (ns, y, height) => svgElement('rect', {x: Math.max(0, x(ns) - 0.5), y, width: 1.2, height, fill: t.ink});
-  const svg = svgElement('svg', {class: 'meter', viewBox: '0 0 100 16', preserveAspectRatio: 'none', role: 'img', 'aria-label': title},
-    svgElement('rect', {x: 0, y: 5, width: x(deadline), height: 6, fill: t.line}),
-    bar(response.max_ns, 0.45), bar(response.p99_ns, 0.6), bar(response.p50_ns, 1), tick(deadline, 0, 16));
-  if (bound) svg.append(tick(bound, 0, 3), tick(bound, 13, 3));
-  return element('span', {title}, svg);
-}
-
-const meterHelp = 'Solid: median; lighter: p99 and max; grey: time up to the deadline. Whole tick: deadline; ticks above and below: bound';
-
 function boundCell(bound, measured, method, alarm) {
   if (bound === null || bound === undefined) return {text: '\u2013', sort: null};
   return timeCell(bound, {kind: alarm ? 'missed' : '', title: `by ${method}${measured > bound ? '; the bound was exceeded' : ''}`});
@@ -45,7 +27,7 @@ function taskTable(group) {
   const columns = [
     column('task'), column('period'), column('deadline'), column('jobs', 'Released jobs'), column('missed', 'Late, skipped or aborted jobs, of all released jobs'),
     column('p50', 'Median response time: finish \u2212 release'), column('p99'), column('max'), column('bound', 'Tightest sound bound on the response time'),
-    column('meter', meterHelp, 'text'), column('max lateness', 'Largest finish \u2212 deadline; negative: the least time to spare'),
+    column('max lateness', 'Largest finish \u2212 deadline; negative: the least time to spare'),
     column('executed / wcet', 'Largest processor time of a job, and the stated worst-case execution time'), column('preempted', 'Number of preemptions'),
   ];
   // Of many tasks, those closest to a miss come first.
@@ -62,7 +44,6 @@ function taskTable(group) {
       {text: named(look, `${group.dags[task.dag].name}.${task.name}`)}, timeCell(task.period_ns), timeCell(task.deadline_ns), countCell(task.jobs.released),
       missCell(task.jobs), ...percentileCells(r, 'p50', 'p99'), timeCell(r && r.max_ns, {kind: lateKind(r && r.max_ns > task.deadline_ns)}),
       boundCell(task.bound_ns, r ? r.max_ns : 0, task.method, task.bound_alarm),
-      {text: meter(t, r, task.deadline_ns, task.bound_ns, look.color), sort: r ? r.max_ns / task.deadline_ns : null},
       timeCell(task.jobs.max_lateness_ns, {kind: lateKind(task.jobs.max_lateness_ns > 0)}),
       {text: `${formatTime(task.execution_max_ns)} / ${formatTime(task.wcet_ns > 0 ? task.wcet_ns : null)}`, sort: task.execution_max_ns,
         kind: lateKind(task.wcet_exceeded)},

@@ -14,21 +14,6 @@ function causesTable({causes}) {
   return element('div.why', {}, table('Causes', columns, causes.map((cause) => ({cells: [cause.text, countCell(cause.jobs), countCell(cause.main), timeCell(cause.time_ns)]}))));
 }
 
-/** Returns a bar of a job's parts, as long as they took. */
-function partsBar(job) {
-  const t = theme();
-  const {length_ns: lengths, text, work} = job.parts;
-  const share = (length) => 100 * length / Math.max(1, job.length_ns);
-  let at = 0;
-  const parts = lengths.map((length, i) => {
-    at += length;
-    return svgElement('rect', {x: share(at - length).toFixed(3), y: 0, width: share(length).toFixed(3), height: 16, fill: work[i] ? t.soft : t.delay,
-      opacity: work[i] || i % 2 === 0 ? 1 : 0.6}, svgElement('title', {}, `${text[i]}: ${formatTime(length)}`));
-  });
-  return svgElement('svg', {class: 'parts', viewBox: '0 0 100 16', preserveAspectRatio: 'none', role: 'img',
-    'aria-label': `Parts of ${formatTime(job.length_ns)}; the table below lists them`}, ...parts);
-}
-
 function partsTable(job) {
   const {begin_ns: begins, length_ns: lengths, text, work} = job.parts;
   const columns = [column(job.end_to_end ? 'since its data began' : 'since its release'), column('nanoseconds'), column('share'), column('what happened', '', 'text')];
@@ -91,7 +76,7 @@ function whySection(groups, state) {
   const panel = place(() => {
     if (!chosen()) return [];
     const job = why().jobs.find(isChosen);
-    if (job) return [element(job.missed ? 'p.job.missed' : 'p.job', {}, job.text), partsBar(job), partsTable(job)];
+    if (job) return [element(job.missed ? 'p.job.missed' : 'p.job', {}, job.text), partsTable(job)];
     const name = nameOf(chosen());
     return [element('p.soft', {}, `${name} ${chosen().missed ? 'missed its deadline' : 'met its deadline'} and is not among the jobs explained here: ${command(name)}`)];
   });
