@@ -52,15 +52,13 @@ void BM_ShownSchedulable(benchmark::State &state) {
 
 void BM_CriticalScalingFactor(benchmark::State &state) {
   on_sets(state, [](const Workload &workload, const analysis::AnalysisPlatform &platform) {
-    const auto task_set = analysis::compile(workload, platform);
-    benchmark::DoNotOptimize(lab::margin_of(workload, platform, lab::knobs_of(workload, *task_set).front()));
+    benchmark::DoNotOptimize(lab::margin_of(workload, platform, lab::knobs_of(workload).front()));
   });
 }
 
 void BM_Sensitivity(benchmark::State &state) {
   on_sets(state, [](const Workload &workload, const analysis::AnalysisPlatform &platform) {
-    const auto task_set = analysis::compile(workload, platform);
-    for (const lab::Knob &knob : lab::knobs_of(workload, *task_set)) {
+    for (const lab::Knob &knob : lab::knobs_of(workload)) {
       benchmark::DoNotOptimize(lab::margin_of(workload, platform, knob));
     }
   });

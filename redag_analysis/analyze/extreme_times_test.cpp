@@ -198,7 +198,7 @@ TEST(ExtremeTimes, NoSearchWraps) {
     ++searched;
     int analyses = 0;
     const auto enough = [&analyses] { return ++analyses > 200; };
-    for (const lab::Knob &knob : lab::knobs_of(drawn.workload, *task_set)) {
+    for (const lab::Knob &knob : lab::knobs_of(drawn.workload)) {
       const auto margin = lab::margin_of(drawn.workload, drawn.platform, knob, lab::accepted_by_analysis, {4, enough});
       if (!margin) break;
     }

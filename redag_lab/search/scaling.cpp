@@ -39,24 +39,6 @@ void scale_execution(Task &task, Duration wcet, std::int64_t numerator, std::int
   for (Duration &sample : task.execution.samples) sample = within(sample);
 }
 
-void set_period(Task &task, Duration period) {
-  if (task.deadline == task.period) task.deadline = period;
-  task.period = period;
-}
-
-// Data tasks have the largest period of their predecessors.
-void inherit_changed_periods(Dag &dag) {
-  const std::vector<std::uint32_t> ranks = topological_ranks(dag);
-  std::vector<std::uint32_t> order(ranks.size());
-  for (std::uint32_t t = 0; t < ranks.size(); ++t) order[ranks[t]] = t;
-  for (const std::uint32_t t : order) {
-    if (dag.tasks[t].activation != Activation::Data) continue;
-    Duration largest = 0;
-    for (const std::uint32_t p : dag.tasks[t].predecessors) largest = std::max(largest, dag.tasks[p].period);
-    set_period(dag.tasks[t], largest);
-  }
-}
-
 // Returns the tasks by TaskId.
 std::vector<Task *> tasks_of(Workload &workload) {
   std::vector<Task *> tasks;
@@ -69,37 +51,26 @@ std::vector<Task *> tasks_of(Workload &workload) {
 }  // namespace
 
 std::int64_t nominal_position(const Workload &workload, const Knob &knob) {
-  if (knob.kind == Knob::Kind::AllWcets || knob.kind == Knob::Kind::Rates) return kFactorUnit;
+  if (knob.kind == Knob::Kind::AllWcets) return kFactorUnit;
   REDAG_CHECK(!knob.tasks.empty(), "a knob for single values names its task");
-  const Task &task = *flatten(workload).at(knob.tasks.front()).task;
-  return knob.kind == Knob::Kind::Wcet ? task.wcet : -task.period;
+  return flatten(workload).at(knob.tasks.front()).task->wcet;
 }
 
 Workload turned(const Workload &workload, const Knob &knob, std::int64_t position) {
-  REDAG_CHECK(knob.kind == Knob::Kind::Period ? position < 0 : position > 0, "a knob does not turn that far");
+  REDAG_CHECK(position > 0, "a knob does not turn that far");
   Workload result = workload;
   const std::vector<Task *> tasks = tasks_of(result);
   for (const std::uint32_t t : knob.tasks) {
     Task &task = *tasks.at(t);
-    switch (knob.kind) {
-      case Knob::Kind::Wcet: scale_execution(task, position, position, task.wcet); break;
-      case Knob::Kind::AllWcets:
-        scale_execution(task, scaled_up(task.wcet, position, kFactorUnit), position, kFactorUnit);
-        break;
-      case Knob::Kind::Period: set_period(task, -position); break;
-      case Knob::Kind::Rates: set_period(task, scaled_down(task.period, kFactorUnit, position)); break;
-    }
-  }
-  if (knob.kind == Knob::Kind::Period || knob.kind == Knob::Kind::Rates) {
-    for (Dag &dag : result.dags) inherit_changed_periods(dag);
+    const bool is_factor = knob.kind == Knob::Kind::AllWcets;
+    const std::int64_t unit = is_factor ? kFactorUnit : task.wcet;
+    scale_execution(task, is_factor ? scaled_up(task.wcet, position, unit) : position, position, unit);
   }
   return result;
 }
 
 double load_factor(const Workload &workload, const Knob &knob, std::int64_t position) {
-  const auto now = static_cast<double>(position);
-  const auto before = static_cast<double>(nominal_position(workload, knob));
-  return knob.kind == Knob::Kind::Period ? before / now : now / before;
+  return static_cast<double>(position) / static_cast<double>(nominal_position(workload, knob));
 }
 
 }  // namespace redag::lab

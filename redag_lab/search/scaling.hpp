@@ -16,13 +16,11 @@ namespace redag::lab {
 /// The unit of factors, which are counted in millionths.
 inline constexpr std::int64_t kFactorUnit = 1'000'000;
 
-/// A quantity that can grow: an execution time or a rate.
+/// A quantity that can grow.
 struct Knob {
   enum class Kind : std::uint8_t {
     Wcet,      // position: the wcet in ns
     AllWcets,  // position: a factor in millionths; wcets are rounded up
-    Period,    // of tasks with one period, changed together; position: minus the period in ns
-    Rates,     // of several tasks; position: a factor in millionths; periods are rounded down
   };
   Kind kind = Kind::AllWcets;
   std::vector<std::uint32_t> tasks;  // TaskIds: one for Wcet, at least one otherwise
@@ -33,10 +31,9 @@ struct Knob {
 /// Returns the knob's position in `workload`. Requires valid TaskIds.
 [[nodiscard]] std::int64_t nominal_position(const Workload &workload, const Knob &knob);
 
-/// Returns the workload with the knob turned. With a wcet, the bcet, the execution-time model and the longest region
-/// change in proportion. With a period, deadlines equal to it change, and the periods that data tasks inherit. Jitter,
-/// offsets, budgets, explicit deadlines and end-to-end deadlines stay. The result need not be valid; compile() reports
-/// it. Requires a position > 0 (Period: < 0) and a valid workload.
+/// Returns the workload with the knob turned. The bcet, the execution-time model and the longest region change in
+/// proportion; budgets and deadlines stay. The result need not be valid; compile() reports it. Requires a position > 0
+/// and a valid workload.
 [[nodiscard]] Workload turned(const Workload &workload, const Knob &knob, std::int64_t position);
 
 /// Returns the load at `position` relative to the workload's own, above 1 where it grew. For display.

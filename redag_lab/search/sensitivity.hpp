@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Finds how far execution times and rates can grow until the analysis no longer says "schedulable", or how far they
-// have to shrink until it does. Searches positions of knobs (scaling.hpp), exact to one nanosecond or one millionth.
-// Pure functions, apart from the caller's hooks.
+// Finds how far execution times can grow until the analysis no longer says "schedulable", or how far they have to
+// shrink until it does. Searches positions of knobs (scaling.hpp), exact to one nanosecond or one millionth. Pure
+// functions, apart from the caller's hooks.
 #pragma once
 
 #include <cstdint>
@@ -39,7 +39,7 @@ using Accepts = std::function<bool(const Workload &, const analysis::TaskSet &)>
 
 struct SensitivityOptions {
   /// The number of evenly spread positions that are tested before the bisection, because acceptance need not be
-  /// monotone. Where periods determine priorities, the positions at which the order changes are tested as well.
+  /// monotone.
   std::uint32_t probes = 16;
   /// Called before every test; true ends the search. Null: never.
   std::function<bool()> stop;
@@ -55,8 +55,7 @@ struct SensitivityOptions {
                                               const Knob &knob, const Accepts &accepts = accepted_by_analysis,
                                               const SensitivityOptions &options = {});
 
-/// Returns the knobs of a report, in its order: all wcets, all rates, each task's wcet, and the period of each unit
-/// that has a timer.
-[[nodiscard]] std::vector<Knob> knobs_of(const Workload &workload, const analysis::TaskSet &task_set);
+/// Returns the knobs of a report, in its order: all wcets, and each task's wcet.
+[[nodiscard]] std::vector<Knob> knobs_of(const Workload &workload);
 
 }  // namespace redag::lab

@@ -40,7 +40,6 @@ TEST(Sensitivity, HarmonicPeriodsUseTheWholeWorker) {
   EXPECT_EQ(found.position, 2 * kFactorUnit);
   EXPECT_DOUBLE_EQ(found.factor, 2.0);
   EXPECT_EQ(found.obstacle, "the utilization exceeds 1");
-  EXPECT_EQ(margin(half, {Kind::Rates, all_tasks(half)}).position, 2 * kFactorUnit);
   // One task takes all the remaining time: 1 ms + 1/2 of 8 ms.
   EXPECT_EQ(margin(half, {Kind::Wcet, {1}}).position, 5 * kMillisecond);
 }
@@ -68,9 +67,6 @@ TEST(Sensitivity, AnOverloadedWorkloadHasToShrink) {
   EXPECT_EQ(all.position, 800'000);
   EXPECT_EQ(margin(heavy, {Kind::Wcet, {0}}).position, 2000);
   EXPECT_EQ(margin(heavy, {Kind::Wcet, {1}}).position, 8000);
-  // 4/16 + 12/16 = 1, at the same rate as b, and 4/8 + 12/24 = 1.
-  EXPECT_EQ(margin(heavy, {Kind::Period, {0}}).position, -16000);
-  EXPECT_EQ(margin(heavy, {Kind::Period, {1}}).position, -24000);
   // Wcets are rounded up to whole nanoseconds. Small ones therefore leave less: 4 and 10 do not fit, 3 and 9 do.
   EXPECT_EQ(all_wcets(independent({{4, 8}, {12, 16}})).position, 750'000);
 }
@@ -83,48 +79,6 @@ TEST(Sensitivity, WhereNoneAloneSufficesItSaysSo) {
   EXPECT_TRUE(all_wcets(hopeless).position);
 }
 
-// A period that passes another one changes the order of priorities.
-TEST(Sensitivity, AChangeOfOrderEndsTheRoom) {
-  const Workload workload = independent({{5, 20, 6}, {3, 40, 10}});
-  // With b at 40, a is first (5 <= 6), then b (8 <= 10). At 20 either can be first, and a responds after 8 > 6.
-  const Margin found = margin(workload, {Kind::Period, {1}});
-  EXPECT_EQ(found.position, -21);
-  EXPECT_EQ(found.obstacle, "the bound of a.t exceeds its deadline");
-}
-
-// Only the period equal to another task's is refused. Evenly spread probes would not meet it.
-TEST(Sensitivity, EveryChangeOfOrderIsTested) {
-  Workload workload = independent({{1, 2003}, {1, 9000}});
-  const Accepts not_equal = [](const Workload &candidate, const analysis::TaskSet &) {
-    return candidate.dags[1].tasks[0].period != 2003;
-  };
-  const analysis::AnalysisPlatform platform = analysis::platform_of(workload);
-  const auto period = margin_of(workload, platform, {Kind::Period, {1}}, not_equal, {0, {}});
-  ASSERT_TRUE(period);
-  EXPECT_EQ(period->position, -2004);
-  const auto rate = margin_of(workload, platform, {Kind::Rates, {1}}, not_equal, {0, {}});
-  ASSERT_TRUE(rate && rate->position);
-  EXPECT_EQ(turned(workload, rate->knob, *rate->position).dags[1].tasks[0].period, 2004);
-  // With fixed priorities the order stays, and this position is not tested.
-  workload.policy = PolicyKind::Fixed;
-  EXPECT_NE(margin_of(workload, platform, {Kind::Period, {1}}, not_equal, {0, {}})->position, -2004);
-}
-
-// A data task joins two rates, and has the larger period: that of b until it is below a's.
-TEST(Sensitivity, DataTasksFollowThePeriodOfTheSlowerPredecessor) {
-  const Workload workload = testing::make_workload(
-      {testing::make_dag("d",
-                         {{.name = "a", .period = 10}, {.name = "b", .period = 40}, {.name = "f", .after = {0, 1}}})},
-      1, PreemptionMode::Os);
-  const Workload faster = turned(workload, {Kind::Period, {1}}, -5 * kMillisecond);
-  EXPECT_EQ(to_string(validate(faster)), "");
-  EXPECT_EQ(faster.dags[0].tasks[2].period, 10 * kMillisecond);
-  EXPECT_EQ(faster.dags[0].tasks[2].deadline, 10 * kMillisecond);
-  const Margin found = margin(workload, {Kind::Period, {1}});
-  ASSERT_TRUE(found.position);
-  EXPECT_GE(*found.position, -10 * kMillisecond) << found.obstacle;
-}
-
 TEST(Sensitivity, StopsWhenAsked) {
   const Workload workload = independent({{kMillisecond, 4 * kMillisecond}});
   SensitivityOptions options;
@@ -133,27 +87,9 @@ TEST(Sensitivity, StopsWhenAsked) {
   EXPECT_FALSE(margin_of(workload, analysis::platform_of(workload), {Kind::Wcet, {0}}, accepted_by_analysis, options));
 }
 
-TEST(Sensitivity, KnobsAreThoseOfTasksAndRates) {
-  Workload workload = independent({{1, 10}, {1, 20}});
-  workload.dags[0].tasks.push_back(workload.dags[0].tasks[0]);
-  workload.dags[0].tasks[1].name = "u";
-  workload.dags[0].tasks[1].period = workload.dags[0].tasks[1].deadline = 30;
-  const auto task_set = analysis::compile(workload, analysis::platform_of(workload));
-  ASSERT_TRUE(task_set);
-  const std::vector<Knob> expected = {{Kind::AllWcets, {0, 1, 2}}, {Kind::Rates, {0, 1, 2}}, {Kind::Wcet, {0}},
-                                      {Kind::Wcet, {1}},           {Kind::Wcet, {2}},        {Kind::Period, {0}},
-                                      {Kind::Period, {1}},         {Kind::Period, {2}}};
-  EXPECT_EQ(knobs_of(workload, *task_set), expected);
-}
-
-TEST(Sensitivity, ADataTaskThatJoinsTwoRatesHasNone) {
-  const Workload workload = testing::make_workload(
-      {testing::make_dag("d", {{"a", 10, 1}, {"b", 40, 1}, {"f", 0, 1, {0, 1}}})}, 1, PreemptionMode::Os);
-  const auto task_set = analysis::compile(workload, analysis::platform_of(workload));
-  ASSERT_TRUE(task_set);
-  const std::vector<Knob> knobs = knobs_of(workload, *task_set);
-  EXPECT_THAT(knobs, ::testing::Contains(Knob{Kind::Period, {1}}));
-  EXPECT_THAT(knobs, ::testing::Not(::testing::Contains(Knob{Kind::Period, {2}})));
+TEST(Sensitivity, KnobsAreThoseOfAllTasksAndOfEach) {
+  const std::vector<Knob> expected = {{Kind::AllWcets, {0, 1}}, {Kind::Wcet, {0}}, {Kind::Wcet, {1}}};
+  EXPECT_EQ(knobs_of(independent({{1, 10}, {1, 20}})), expected);
 }
 
 // True if no deadline is missed and no job skipped when all tasks start together and run for their wcet.
@@ -201,7 +137,7 @@ void expect_consistent(const BoundCaseLimits &limits) {
     ASSERT_TRUE(task_set);
     const bool nominal = analysis::analyze(*task_set).verdict == analysis::Verdict::Schedulable;
     EXPECT_EQ(analysis::is_shown_schedulable(*task_set), nominal);
-    for (const Knob &knob : knobs_of(bound_case.workload, *task_set)) {
+    for (const Knob &knob : knobs_of(bound_case.workload)) {
       const auto result = margin_of(bound_case.workload, bound_case.platform, knob, accepted_by_analysis, {4, {}});
       ASSERT_TRUE(result);
       if (!result->position) {
@@ -216,13 +152,11 @@ void expect_consistent(const BoundCaseLimits &limits) {
       EXPECT_EQ(analysis::analyze(analysis::compile(at, bound_case.platform).value()).verdict,
                 analysis::Verdict::Schedulable);
       EXPECT_TRUE(simulated_without_a_miss(bound_case, at));
-      // A random position between was not tested, but must hold too. Bounds cover shorter executions and later
-      // releases, and every change of the order of priorities was tested.
+      // A random position between was not tested, but must hold too. Bounds cover shorter executions.
       if (nominal) {
         const std::int64_t between = rng.uniform(result->nominal, *result->position);
         EXPECT_TRUE(simulated_without_a_miss(bound_case, turned(bound_case.workload, knob, between))) << between;
       }
-      if (knob.kind == Kind::Period && *result->position == -1) continue;
       const auto beyond =
           analysis::compile(turned(bound_case.workload, knob, *result->position + 1), bound_case.platform);
       EXPECT_TRUE(!beyond || analysis::analyze(*beyond).verdict == analysis::Verdict::NotShown);
@@ -270,10 +204,6 @@ TEST(Scaling, KeepsAWorkloadValid) {
   EXPECT_EQ(doubled.dags[0].tasks[0].execution.samples, (std::vector<Duration>{8, 14, 20}));
   EXPECT_EQ(doubled.dags[0].tasks[0].region, 6);
   EXPECT_EQ(turned(workload, {Kind::AllWcets, {0}}, kFactorUnit), workload);
-  EXPECT_EQ(turned(workload, {Kind::Period, {0}}, -50).dags[0].tasks[0].deadline, 50);
-  task.deadline = 60;
-  EXPECT_EQ(turned(workload, {Kind::Rates, {0}}, 3 * kFactorUnit).dags[0].tasks[0].deadline, 60);
-  EXPECT_EQ(turned(workload, {Kind::Rates, {0}}, 3 * kFactorUnit).dags[0].tasks[0].period, 33);
 }
 
 }  // namespace

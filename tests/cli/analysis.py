@@ -301,9 +301,7 @@ class Sensitivity(Case):
         self.assertIn("schedulable: every deadline is met", text)
         self.assertRegex(text, r"all wcets +- +- +2\.0000 +the utilization exceeds 1")
         self.assertRegex(text, r"wcet of b\.t +1ms +5ms +5\.0000")
-        rows = self.limits(file)
-        self.assertEqual(rows["all rates"]["factor"], 2)
-        self.assertEqual(rows["wcet of b.t"]["limit_ns"], 5_000_000)
+        self.assertEqual(self.limits(file)["wcet of b.t"]["limit_ns"], 5_000_000)
 
     def test_what_has_to_shrink(self):
         file = self.write("heavy.yaml", HARMONIC.replace("wcet: 2ms", "wcet: 14ms"))  # U = 5/4
@@ -315,24 +313,19 @@ class Sensitivity(Case):
         self.assertRegex(redag("analyze", "--sensitivity", hopeless).stdout, r"wcet of c\.t +17ms +none +none ")
 
     def test_of_many_those_with_the_least_room_are_shown(self):
-        tasks = "".join(f"      - {{name: t{i:02}, wcet: {1 + i % 7}us, period: 10ms}}\n" for i in range(26))
+        tasks = "".join(f"      - {{name: t{i:02}, wcet: {1 + i % 7}us, period: 10ms}}\n" for i in range(52))
         file = self.write("many.yaml", f"name: many\nplatform: {{workers: 1}}\ndags:\n  - name: d\n    tasks:\n{tasks}")
         text = self.expect(redag("analyze", "--sensitivity", file), 0).stdout
         shown, of = map(int, re.search(r"\(the (\d+) of (\d+) that can grow least; --all-tasks shows all\)", text).groups())
         self.assertLess(shown, of)
-        row = r"(?m)^(?:all|wcet of|period of) \S+ +[\d-]"
+        row = r"(?m)^(?:all|wcet of) \S+ +[\d-]"
         self.assertEqual((len(re.findall(row, text)), shown), (50, 50))
         self.assertEqual(len(re.findall(row, redag("analyze", "--sensitivity", file, "--all-tasks").stdout)), of)
 
     def test_limits_hold_in_the_analysis(self):
-        rows = self.limits(self.cart, "--preemption", "os")
-        limit = rows["wcet of slow.plan"]["limit_ns"]
+        limit = self.limits(self.cart, "--preemption", "os")["wcet of slow.plan"]["limit_ns"]
         for wcet, status in ((limit, 0), (limit + 1, 1)):
             changed = self.write("changed.yaml", CART.replace("25ms", f"{wcet}ns"))
-            self.expect(redag("analyze", changed, "--preemption", "os", "--check"), status)
-        period = rows["period of fast"]["limit_ns"]
-        for value, status in ((period, 0), (period - 1, 1)):
-            changed = self.write("changed.yaml", CART.replace("period: 10ms", f"period: {value}ns"))
             self.expect(redag("analyze", changed, "--preemption", "os", "--check"), status)
 
     def test_clusters_have_limits_of_their_own(self):

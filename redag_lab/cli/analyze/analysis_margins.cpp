@@ -29,21 +29,19 @@ std::string format_factor(double factor) {
 
 // Returns the value of a knob that turns a single value; nothing for other knobs.
 std::optional<Duration> value_at(const Knob &knob, std::optional<std::int64_t> position) {
-  if (!position || knob.kind == Kind::AllWcets || knob.kind == Kind::Rates) return std::nullopt;
-  return knob.kind == Kind::Period ? -*position : *position;
+  return knob.kind == Kind::Wcet ? position : std::nullopt;
 }
 
-// Formats the limit, rounded towards less load: a wcet down, a period up.
+// Formats the limit, rounded down.
 std::string limit_text(const Margin &margin) {
   if (!margin.position) return "none";
   const std::optional<Duration> value = value_at(margin.knob, margin.position);
-  if (!value) return "-";
-  return margin.knob.kind == Kind::Period ? humanize_up(*value) : humanize_down(*value);
+  return value ? humanize_down(*value) : "-";
 }
 
-// Returns all margins in order, or those with the least room. Those of all tasks together are the first two.
+// Returns all margins in order, or those with the least room. That of all tasks together is the first.
 std::vector<Margin> shown_margins(std::vector<Margin> margins, bool all) {
-  constexpr std::size_t kOfAllTasks = 2;
+  constexpr std::size_t kOfAllTasks = 1;
   if (all || margins.size() <= kMostRows) return margins;
   std::stable_sort(margins.begin() + kOfAllTasks, margins.end(),
                    [](const Margin &a, const Margin &b) { return a.factor < b.factor; });
@@ -51,27 +49,11 @@ std::vector<Margin> shown_margins(std::vector<Margin> margins, bool all) {
   return margins;
 }
 
-const char *kind_name(Kind kind) {
-  switch (kind) {
-    case Kind::Wcet: return "wcet";
-    case Kind::AllWcets: return "all_wcets";
-    case Kind::Period: return "period";
-    case Kind::Rates: return "rates";
-  }
-  return "?";
-}
-
 }  // namespace
 
 std::string knob_name(const lab::Analysed &analysed, const Knob &knob) {
   if (knob.kind == Kind::AllWcets) return "all wcets";
-  if (knob.kind == Kind::Rates) return "all rates";
-  const std::string task = task_name(analysed, TaskId(knob.tasks.front()));
-  if (knob.kind == Kind::Wcet) return "wcet of " + task;
-  const analysis::CompiledDag &dag = analysed.task_set.dags[analysed.task_set.tasks[knob.tasks.front()].dag.value];
-  if (knob.tasks.size() == dag.tasks.size()) return "period of " + dag.name;
-  const std::size_t others = knob.tasks.size() - 1;
-  return "period of " + task + (others > 0 ? fmt::format(" and {} more", others) : "");
+  return "wcet of " + task_name(analysed, TaskId(knob.tasks.front()));
 }
 
 std::string describe(const lab::Analysed &analysed, const std::vector<Margin> &margins, const StreamTraits &terminal,
@@ -107,7 +89,7 @@ Json to_json(const lab::Analysed &analysed, const std::vector<Margin> &margins) 
   Json rows = Json::array();
   for (const Margin &margin : margins) {
     rows.push_back(Json{{"name", knob_name(analysed, margin.knob)},
-                        {"kind", kind_name(margin.knob.kind)},
+                        {"kind", margin.knob.kind == Kind::AllWcets ? "all_wcets" : "wcet"},
                         {"now_ns", value(value_at(margin.knob, margin.nominal))},
                         {"limit_ns", value(value_at(margin.knob, margin.position))},
                         {"factor", margin.position ? Json(margin.factor) : Json()},

@@ -162,10 +162,10 @@ Json json_of(const Parts &parts, const std::vector<Asked> &asked, const AnalyzeO
   return document;
 }
 
-// Finds the margin of every execution time and rate of a part. Those found before an early end remain.
+// Finds the margin of every execution time of a part. Those found before an early end remain.
 void find_margins(const lab::Analysed &analysed, AnalysisWatch &watch, Asked &asked, Console &console) {
   std::vector<lab::Margin> &margins = asked.margins;
-  const std::vector<lab::Knob> knobs = lab::knobs_of(analysed.workload, analysed.task_set);
+  const std::vector<lab::Knob> knobs = lab::knobs_of(analysed.workload);
   Progress &progress = watch.progress();
   lab::SensitivityOptions searching;
   searching.stop = [&] {
