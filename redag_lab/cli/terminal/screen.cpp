@@ -72,8 +72,6 @@ attr_t attributes_of(std::string_view code) {
 
 KeyPress press_of(int code) {
   constexpr int kEscape = 27;
-  constexpr int kControlH = 8;
-  constexpr int kDelete = 127;
   switch (code) {
     case KEY_UP: return {Key::Up};
     case KEY_DOWN: return {Key::Down};
@@ -86,9 +84,6 @@ KeyPress press_of(int code) {
     case '\r':
     case '\n': return {Key::Enter};
     case kEscape: return {Key::Escape};
-    case KEY_BACKSPACE:
-    case kControlH:
-    case kDelete: return {Key::Backspace};
     default: break;
   }
   if (code >= 0x20 && code < 0x7f) return {Key::Text, static_cast<char>(code)};

@@ -26,7 +26,6 @@ enum class Key : std::uint8_t {
   Tab,
   Enter,
   Escape,
-  Backspace,
   Closed,  // the terminal is gone
 };
 

@@ -25,14 +25,6 @@ constexpr double kNear = 0.9;      // share of the limit that counts as near
 constexpr int kMissedUpdates = 4;  // after which a page is stale
 constexpr Duration kPatience = kSecond;
 
-char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
-
-/// True if `text` contains `part`, whatever the case of ASCII letters.
-bool contains(const std::string &text, const std::string &part) {
-  const auto same = [](char a, char b) { return lower(a) == lower(b); };
-  return std::search(text.begin(), text.end(), part.begin(), part.end(), same) != text.end() || part.empty();
-}
-
 double key_of(const LiveRow &row, LiveOrder order) {
   const Figures &figures = row.figures();
   switch (order) {
@@ -49,20 +41,6 @@ double key_of(const LiveRow &row, LiveOrder order) {
 
 // The kernel's order of all tasks: by priority, and tasks without a priority of their own last; then by period.
 std::pair<int, Duration> urgency(const LiveRow &row) { return {-row.task->priority, row.task->period}; }
-
-/// Adds the tasks of a DAG that the filter shows, below the DAG if `with_dag`. A DAG is shown with any of its tasks.
-void add_dag(const live::Listed &executor, std::size_t index, const std::string &filter, bool with_dag,
-             std::vector<LiveRow> &rows) {
-  const Frame &frame = executor.page->frame;
-  const DagFrame &dag = frame.dags[index];
-  const std::size_t at = rows.size();
-  for (const TaskFrame &task : frame.tasks) {
-    if (task.dag == index && contains(full_name(task, frame), filter)) rows.push_back({&executor, &dag, &task});
-  }
-  if (with_dag && (rows.size() > at || contains(dag.name, filter))) {
-    rows.insert(rows.begin() + static_cast<std::ptrdiff_t>(at), LiveRow{&executor, &dag});
-  }
-}
 
 }  // namespace
 
@@ -83,9 +61,13 @@ std::vector<LiveRow> rows_of(std::span<const live::Listed> pages, const LiveView
   std::vector<LiveRow> rows;
   for (const live::Listed &listed : pages) {
     if (!listed.page) continue;
-    // Of all executors, one can be meant by its name.
-    const std::string filter = view.all && contains(listed.page->frame.name, view.filter) ? "" : view.filter;
-    for (std::size_t d = 0; d < listed.page->frame.dags.size(); ++d) add_dag(listed, d, filter, by_dag, rows);
+    const Frame &frame = listed.page->frame;
+    for (std::size_t d = 0; d < frame.dags.size(); ++d) {
+      if (by_dag) rows.push_back({&listed, &frame.dags[d]});
+      for (const TaskFrame &task : frame.tasks) {
+        if (task.dag == d) rows.push_back({&listed, &frame.dags[d], &task});
+      }
+    }
   }
   if (by_dag) return rows;
   std::stable_sort(rows.begin(), rows.end(), [&](const LiveRow &a, const LiveRow &b) {

@@ -24,7 +24,6 @@ struct LiveView {
   bool all = false;                  // the tasks of all executors
   LiveOrder order = LiveOrder::Dag;  // Dag: each DAG with its tasks below it, or of all executors the most urgent task
                                      // first; otherwise tasks, the largest first
-  std::string filter = {};           // part of the names to show, in any case; empty: all
 };
 
 /// A DAG or a task of an executor's page.

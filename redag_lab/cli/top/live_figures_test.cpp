@@ -7,8 +7,8 @@
 #include <gtest/gtest.h>
 
 #include "redag_lab/cli/top/attachment.hpp"
-#include "redag_lab/cli/top/frame_for_tests.hpp"
 #include "redag_lab/cli/top/live_json.hpp"
+#include "tests/testing/live_frame.hpp"
 
 namespace redag::cli {
 namespace {
@@ -56,14 +56,6 @@ TEST(LiveRows, WhoMissesNowIsFirst) {
   EXPECT_EQ(names_of(listed, {.order = LiveOrder::Misses}), (Names{"fast.act", "fast.sense", "slow.plan"}));
 }
 
-TEST(LiveRows, AFilterKeepsTheDagsOfItsTasks) {
-  const live::Listed listed = small_page();
-  EXPECT_EQ(names_of(listed, {.filter = "PLAN"}), (Names{"slow", "slow.plan"}));
-  EXPECT_EQ(names_of(listed, {.filter = "fast"}), (Names{"fast", "fast.sense", "fast.act"}));
-  EXPECT_EQ(names_of(listed, {.order = LiveOrder::Rate, .filter = "fast.s"}), (Names{"fast.sense"}));
-  EXPECT_EQ(names_of(listed, {.filter = "x"}), Names{});
-}
-
 TEST(LiveRows, OfAllExecutorsFollowTheKernelsOrder) {
   const std::vector<live::Listed> pages = machine();
   const auto names = [&](const LiveView &view) {
@@ -73,10 +65,6 @@ TEST(LiveRows, OfAllExecutorsFollowTheKernelsOrder) {
   };
   EXPECT_THAT(names({.all = true}), ElementsAre("cart:sense", "cart:act", "arm:sense", "arm:act", "cart:plan",
                                                 "arm:plan", "plain:sense", "plain:act", "plain:plan"));
-  EXPECT_THAT(names({.all = true, .filter = "PLAN"}), ElementsAre("cart:plan", "arm:plan", "plain:plan"));
-  EXPECT_THAT(names({.all = true, .filter = "arm"}), ElementsAre("arm:sense", "arm:act", "arm:plan"));
-  EXPECT_THAT(names({.all = true, .order = LiveOrder::Rate, .filter = "act"}),
-              ElementsAre("cart:act", "arm:act", "plain:act"));
 }
 
 TEST(LiveFigures, Tints) {

@@ -192,7 +192,6 @@ Action add_top(CLI::App &app) {
   app.add_flag("--json", options->json, "Print one frame (or the list) as a JSON document and exit");
   add_duration(app, "--interval", options->interval, "Time between two updates");
   add_choice(app, "--sort", view.order, choices_of(kSortOrders), "Order of the rows");
-  app.add_option("--filter", view.filter, "Show only DAGs and tasks whose name contains this")->type_name("TEXT");
   add_pages_folder(app, options->folder);
   return [options](Console &console) { return top(*options, console); };
 }

@@ -10,8 +10,6 @@
 namespace redag::cli {
 namespace {
 
-constexpr std::size_t kMostTyped = 60;
-
 void scroll(Key key, TopState &state) {
   switch (key) {
     case Key::Up: state.first -= std::min<std::size_t>(state.first, 1); break;
@@ -29,32 +27,9 @@ void enter(TopMode mode, TopState &state) {
   state.first = 0;
 }
 
-TopAction press_filter(const KeyPress &key, TopState &state) {
-  std::string &filter = state.view.filter;
-  switch (key.key) {
-    case Key::Text:
-      if (filter.size() < kMostTyped) filter += key.text;
-      break;
-    case Key::Backspace:
-      if (!filter.empty()) filter.pop_back();
-      break;
-    case Key::Escape:
-      filter.clear();
-      enter(TopMode::Table, state);
-      break;
-    case Key::Enter: enter(TopMode::Table, state); break;
-    default: break;
-  }
-  return TopAction::None;
-}
-
 TopAction press_table(const KeyPress &key, TopState &state) {
   LiveView &view = state.view;
-  if (key.key == Key::Escape) {
-    // Takes back the filter first.
-    if (view.filter.empty()) return TopAction::Quit;
-    view.filter.clear();
-  }
+  if (key.key == Key::Escape) return TopAction::Quit;
   if (key.key == Key::Tab) return std::exchange(view.all, false) ? TopAction::None : TopAction::Next;
   if (key.key != Key::Text) {
     scroll(key.key, state);
@@ -65,8 +40,6 @@ TopAction press_table(const KeyPress &key, TopState &state) {
   switch (key.text) {
     case '?':
     case 'h': enter(TopMode::Help, state); break;
-    case 'f':
-    case '/': enter(TopMode::Filter, state); break;
     case '<': turn_to(order + kLiveOrders - 1); break;
     case '>': turn_to(order + 1); break;
     case 'a': view.all = !view.all; break;
@@ -92,12 +65,7 @@ TopAction press_help(const KeyPress &key, TopState &state) {
 
 TopAction press(const KeyPress &key, TopState &state) {
   if (key.key == Key::Closed) return TopAction::Quit;
-  switch (state.mode) {
-    case TopMode::Filter: return press_filter(key, state);
-    case TopMode::Table: return press_table(key, state);
-    case TopMode::Help: break;
-  }
-  return press_help(key, state);
+  return state.mode == TopMode::Help ? press_help(key, state) : press_table(key, state);
 }
 
 }  // namespace redag::cli

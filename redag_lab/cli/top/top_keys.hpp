@@ -15,7 +15,6 @@ namespace redag::cli {
 enum class TopMode : std::uint8_t {
   Table,  // DAGs and tasks
   Help,
-  Filter,  // the table, while a filter is being typed
 };
 
 struct TopState {

@@ -51,31 +51,6 @@ TEST_F(Keys, ChooseTheRows) {
   EXPECT_FALSE(state_.view.all || state_.paused);
 }
 
-TEST_F(Keys, AFilterActsWhileItIsTyped) {
-  press("f");
-  EXPECT_EQ(state_.mode, TopMode::Filter);
-  press("qp");  // letters, not keys
-  EXPECT_EQ(state_.view.filter, "qp");
-  press(Key::Backspace);
-  press(Key::Backspace);
-  press(Key::Backspace);
-  press("plan");
-  press(Key::Enter);
-  EXPECT_EQ(state_.mode, TopMode::Table);
-  EXPECT_EQ(state_.view.filter, "plan");
-  press("/");
-  press(Key::Escape);
-  EXPECT_EQ(state_.mode, TopMode::Table);
-  EXPECT_EQ(state_.view.filter, "");
-  press("fact");
-  press(Key::Enter);
-  EXPECT_EQ(press(Key::Escape), TopAction::None) << "takes back the filter first";
-  EXPECT_EQ(state_.view.filter, "");
-  EXPECT_EQ(press(Key::Escape), TopAction::Quit);
-  press("f" + std::string(1000, 'x'));
-  EXPECT_EQ(state_.view.filter, std::string(60, 'x'));
-}
-
 TEST_F(Keys, HelpScrollsAndGoes) {
   press("?");
   EXPECT_EQ(state_.mode, TopMode::Help);
@@ -87,6 +62,8 @@ TEST_F(Keys, HelpScrollsAndGoes) {
   EXPECT_FALSE(state_.view.all) << "the letter only leaves the help";
   press("h");
   EXPECT_EQ(press("q"), TopAction::Quit);
+  state_.mode = TopMode::Table;
+  EXPECT_EQ(press(Key::Escape), TopAction::Quit);
 }
 
 TEST_F(Keys, TabShowsOneExecutorAndThenTheNext) {
@@ -97,7 +74,7 @@ TEST_F(Keys, TabShowsOneExecutorAndThenTheNext) {
 }
 
 TEST_F(Keys, TheTerminalCanGoInEachMode) {
-  for (const TopMode mode : {TopMode::Table, TopMode::Help, TopMode::Filter}) {
+  for (const TopMode mode : {TopMode::Table, TopMode::Help}) {
     state_.mode = mode;
     EXPECT_EQ(press(Key::Closed), TopAction::Quit);
     EXPECT_EQ(press(Key::None), TopAction::None);

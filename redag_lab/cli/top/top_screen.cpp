@@ -27,7 +27,6 @@ constexpr std::size_t kMostDevices = 4;  // on a screen
 constexpr std::array kHelp{
     "KEYS",
     "  arrows, page keys, Home, End    scroll",
-    "  f        show only names that contain a text (Esc: all again)",
     "  < >      next order of the rows",
     "  a        the tasks of all executors, most urgent first",
     "  Tab      next executor",
@@ -49,7 +48,7 @@ constexpr std::array kHelp{
 };
 
 // Keys that matter most come first, because a narrow screen shows the beginning.
-constexpr const char *kKeys = "? help  q quit  f filter  < > sort  a all  Tab next";
+constexpr const char *kKeys = "? help  q quit  < > sort  a all  Tab next";
 constexpr const char *kNone = "no running executor publishes a live page; waiting for one";
 
 /// Returns the lines above the tables of an executor.
@@ -128,10 +127,8 @@ class Drawing {
     // Titles of the table stay while its rows are scrolled.
     parts.head.push_back(std::move(parts.body.front()));
     parts.body.erase(parts.body.begin());
-    if (parts.body.empty()) {
-      parts.body.emplace_back(state_.view.filter.empty() ? "no tasks yet" : "no name contains the filter's text");
-    }
-    parts.foot = state_.mode == TopMode::Filter ? "filter: " + state_.view.filter + "_" : kKeys;
+    if (parts.body.empty()) parts.body.emplace_back("no tasks yet");
+    parts.foot = kKeys;
     return parts;
   }
 
@@ -141,7 +138,6 @@ class Drawing {
     std::string line = fmt::format("sorted by {}", order);
     if (!view.all) line += ", last " + humanize_duration(input_.shown->page->frame.window);
     line = tinted(line, Tint::Faint, colour_);
-    if (!view.filter.empty()) line += tinted("  filter: " + view.filter, Tint::Caution, colour_);
     if (state_.paused) line += tinted("  paused", Tint::Caution, colour_);
     return line;
   }

@@ -11,7 +11,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "redag_lab/cli/top/frame_for_tests.hpp"
+#include "tests/testing/live_frame.hpp"
 #include "tests/testing/repository.hpp"
 
 namespace redag::cli {
@@ -198,7 +198,7 @@ TEST(TopScreen, NamesOfAllTasksAreWholeAt80x24) {
 
 TEST(TopScreen, FitsEachSize) {
   const live::Listed robot = accelerated_page();
-  for (const TopMode mode : {TopMode::Table, TopMode::Help, TopMode::Filter}) {
+  for (const TopMode mode : {TopMode::Table, TopMode::Help}) {
     TopState state;
     state.mode = mode;
     for (const std::size_t columns : {1U, 2U, 3U, 7U, 12U, 20U, 37U, 40U, 72U, 80U, 81U, 133U, 300U}) {
@@ -233,24 +233,15 @@ TEST(TopScreen, SaysWhatIsTheMatter) {
               HasSubstr("no update for 5s"));
   small.page->frame.alert = "deadlock: a waits for b";
   small.page->frame.left_out = 3;
-  state.view.filter = "nothing";
   const std::string text = joined(shoot(state, &small, 80, 24));
   EXPECT_THAT(text, HasSubstr("deadlock: a waits for b"));
   EXPECT_THAT(text, HasSubstr("3 more tasks do not fit"));
   EXPECT_THAT(text, HasSubstr("paused"));
-  EXPECT_THAT(text, HasSubstr("filter: nothing"));
-  EXPECT_THAT(text, HasSubstr("no name contains"));
   const TopInput gone{.pages = pages, .shown = &small, .is_gone = true, .now = 100 * kSecond};
   const std::string ended = joined(draw_top(state, gone, 80, 24, false));
   EXPECT_THAT(ended, HasSubstr("has ended"));
   EXPECT_THAT(ended, Not(HasSubstr("no update")));
   EXPECT_THAT(joined(shoot(nullptr, 80, 24)), HasSubstr("waiting for one"));
-}
-
-TEST(TopScreen, WhatIsTypedIsOnTheLastLine) {
-  const live::Listed small = small_page();
-  TopState state{.view = {.filter = "pl"}, .mode = TopMode::Filter};
-  EXPECT_EQ(shoot(state, &small, 80, 24).back(), "filter: pl_");
 }
 
 TEST(TopOnce, WhatIsCutIsMarked) {

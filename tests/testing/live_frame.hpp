@@ -9,7 +9,7 @@
 
 #include "redag/live/reader.hpp"
 
-namespace redag::cli::testing {
+namespace redag::testing {
 
 inline live::Listed listed(live::Frame frame, std::int64_t pid = 12, std::uint64_t start = 1) {
   return live::Listed{live::page_path("/x", pid, 0), pid, 0, live::Page{{pid, start, 1}, std::move(frame)}};
@@ -52,4 +52,4 @@ inline live::Listed small_page(std::int64_t pid = 12, const std::string &name = 
   return listed(std::move(frame), pid, start);
 }
 
-}  // namespace redag::cli::testing
+}  // namespace redag::testing
