@@ -18,17 +18,15 @@ int order(const T &x, const T &y) {
   return x < y ? -1 : (y < x ? 1 : 0);
 }
 
-// The comparisons return less than 0 if `a` is better.
-int compare(const Extremes &a, const Extremes &b, Objective objective) {
-  if (objective == Objective::Lateness) return order(a.worst_lateness, b.worst_lateness);
-  return order(b.least_slack, a.least_slack);
-}
+// Returns less than 0 if `a` has more slack. Without a response, nothing is late.
+int by_slack(const Score &a, const Score &b) { return order(b.slack.value_or(1), a.slack.value_or(1)); }
 
-int compare(const Score &a, const Score &b, Objective objective) {
+// Returns less than 0 if `a` is better.
+int compare(const Score &a, const Score &b, Judge judge) {
   if (a.proven != b.proven) return a.proven ? -1 : 1;
-  if (objective == Objective::Misses) return order(a.missed, b.missed);
-  if (const int lost = order(a.lost, b.lost); lost != 0) return lost;
-  return compare(a.extremes, b.extremes, objective);
+  if (judge == Judge::Simulation) return order(a.missed, b.missed);
+  const int lost = order(a.lost, b.lost);
+  return lost != 0 ? lost : by_slack(a, b);
 }
 
 void count(const metrics::JudgedJob &job, Duration deadline, Duration end_to_end, Score &score) {
@@ -38,39 +36,23 @@ void count(const metrics::JudgedJob &job, Duration deadline, Duration end_to_end
   // A job in flight before its deadline has an unknown lateness.
   const bool in_flight = job.record.outcome == metrics::JobOutcome::InFlight;
   if (!job.response || (in_flight && job.miss == metrics::Miss::None)) return;
-  score.extremes.see(*job.response, deadline);
-  if (end_to_end > 0 && job.end_to_end) score.extremes.see(*job.end_to_end, end_to_end);
+  score.see(*job.response, deadline);
+  if (end_to_end > 0 && job.end_to_end) score.see(*job.end_to_end, end_to_end);
 }
 
 }  // namespace
 
-const char *to_string(Objective objective) {
-  switch (objective) {
-    case Objective::Misses: return "misses";
-    case Objective::Lateness: return "lateness";
-    case Objective::Slack: return "slack";
-  }
-  return "?";
-}
+const char *to_string(Judge judge) { return judge == Judge::Simulation ? "simulation" : "bounds"; }
 
-void Extremes::see(Duration response, Duration due) {
-  const Duration lateness = response - due;
-  const double slack = static_cast<double>(due - response) / static_cast<double>(due);
-  add({.worst_lateness = lateness, .least_slack = slack, .any = true});
-}
-
-void Extremes::add(const Extremes &other) {
-  if (!other.any) return;
-  worst_lateness = any ? std::max(worst_lateness, other.worst_lateness) : other.worst_lateness;
-  least_slack = any ? std::min(least_slack, other.least_slack) : other.least_slack;
-  any = true;
+void Score::see(Duration response, Duration due) {
+  slack = std::min(slack.value_or(1), static_cast<double>(due - response) / static_cast<double>(due));
 }
 
 void Score::add(const Score &run) {
   judged += run.judged;
   missed += run.missed;
   lost += run.lost;
-  extremes.add(run.extremes);
+  if (run.slack) slack = std::min(slack.value_or(1), *run.slack);
 }
 
 Score score_of_bounds(const analysis::TaskSet &task_set) {
@@ -83,7 +65,7 @@ Score score_of_bounds(const analysis::TaskSet &task_set) {
     if (!tightest.response) {
       ++score.lost;
     } else {
-      score.extremes.see(*tightest.response, due);
+      score.see(*tightest.response, due);
     }
   };
   for (std::size_t t = 0; t < task_set.tasks.size(); ++t) {
@@ -95,11 +77,11 @@ Score score_of_bounds(const analysis::TaskSet &task_set) {
   return score;
 }
 
-bool improves(const Score &a, const Score &b, Objective objective) { return compare(a, b, objective) < 0; }
+bool improves(const Score &a, const Score &b, Judge judge) { return compare(a, b, judge) < 0; }
 
-bool is_better(const Score &a, const Score &b, Objective objective) {
-  if (const int better = compare(a, b, objective); better != 0) return better < 0;
-  if (a.extremes.least_slack != b.extremes.least_slack) return a.extremes.least_slack > b.extremes.least_slack;
+bool is_better(const Score &a, const Score &b, Judge judge) {
+  if (const int better = compare(a, b, judge); better != 0) return better < 0;
+  if (const int slack = by_slack(a, b); slack != 0) return slack < 0;
   return a.changes < b.changes;
 }
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What `tune` looks for: the objective, the score of a setting by its bounds or by simulated runs, and the comparison
+// What `tune` looks for: the score of a setting by its bounds or by simulated runs, and the comparison
 // of two scores. Scores of runs are observations, not bounds: other seeds can be worse. Pure, apart from `stop`.
 #pragma once
 
@@ -15,25 +15,13 @@
 
 namespace redag::lab {
 
-enum class Objective : std::uint8_t {
-  Misses,    // fewest jobs late or lost; by bounds, fewest deadlines that are not shown to be met
-  Lateness,  // smallest maximum of response - deadline; fewer without a response come first
-  Slack,     // largest minimum of (deadline - response) / deadline; likewise
+enum class Judge : std::uint8_t {
+  Simulation,  // fewest jobs late or lost
+  Bounds,      // fewest without a bound, then the most slack
 };
 
-/// "misses", "lateness" or "slack".
-[[nodiscard]] const char *to_string(Objective objective);
-
-/// The extremes of responses, or of bounds on them, against their deadlines.
-struct Extremes {
-  Duration worst_lateness = 0;
-  double least_slack = 1;
-  bool any = false;  // something was seen, and the others are valid
-
-  void see(Duration response, Duration due);
-  void add(const Extremes &other);
-  friend bool operator==(const Extremes &, const Extremes &) = default;
-};
+/// "simulation" or "bounds".
+[[nodiscard]] const char *to_string(Judge judge);
 
 /// The quality of a setting: counts of jobs in simulated runs, or of tasks and DAGs with a deadline by their bounds. An
 /// end-to-end deadline counts as the deadline of the jobs that carry the data.
@@ -42,9 +30,10 @@ struct Score {
   std::uint64_t judged = 0;   // jobs released, or deadlines
   std::uint64_t missed = 0;   // lost or late; or not shown to be met
   std::uint64_t lost = 0;     // skipped, or aborted although there was data; or without a bound
-  Extremes extremes;          // of those with a response, or a bound
+  std::optional<double> slack;  // the least (deadline - response) / deadline, of jobs or bounds
   std::uint32_t changes = 0;  // number of differences from the present workload
 
+  void see(Duration response, Duration due);
   void add(const Score &run);
   friend bool operator==(const Score &, const Score &) = default;
 };
@@ -62,9 +51,9 @@ struct Simulation {
 [[nodiscard]] std::optional<Score> score_of_run(const Workload &workload, std::uint64_t seed,
                                                 const Simulation &simulation, const std::atomic<bool> *stop);
 
-/// A proven setting wins, then the objective; true justifies a change.
-[[nodiscard]] bool improves(const Score &a, const Score &b, Objective objective);
+/// A proven setting wins, then the judge's criterion; true justifies a change.
+[[nodiscard]] bool improves(const Score &a, const Score &b, Judge judge);
 /// As improves(); equals are decided by more slack, then by fewer changes.
-[[nodiscard]] bool is_better(const Score &a, const Score &b, Objective objective);
+[[nodiscard]] bool is_better(const Score &a, const Score &b, Judge judge);
 
 }  // namespace redag::lab

@@ -34,15 +34,15 @@ class Tuner {
         arena_(jobs_) {}
 
   std::optional<Tuned> run() {
-    const auto better = [this](const Score &a, const Score &b) { return is_better(a, b, options_.objective); };
+    const auto better = [this](const Score &a, const Score &b) { return is_better(a, b, options_.judge); };
     CoordinateSearch search([this](std::span<const Point> points) { return scores_of(points); }, better);
     auto found = search.run(settings_.space(), options_.effort);
     if (found.trials.empty()) return std::nullopt;
 
     Tuned tuned;
     tuned.present = candidate(settings_.space().starts.front(), found.trials);
-    // The workload stays as it is unless the goal prefers another one.
-    const bool is_improved = improves(found.score, tuned.present.score, options_.objective);
+    // The workload stays as it is unless the judge prefers another one.
+    const bool is_improved = improves(found.score, tuned.present.score, options_.judge);
     tuned.found = is_improved ? candidate(found.best, found.trials) : tuned.present;
     tuned.exhaustive = found.exhaustive;
     tuned.stopped = found.stopped;
@@ -154,7 +154,7 @@ class Tuner {
     judge(tuned.present, scores.front());
     if (scores.size() > 1) judge(tuned.found, scores.back());
     if (scores.size() == 1) tuned.found = tuned.present;
-    const bool holds = !improves(tuned.present.held_out, tuned.found.held_out, options_.objective);
+    const bool holds = !improves(tuned.present.held_out, tuned.found.held_out, options_.judge);
     tuned.best = holds ? tuned.found : tuned.present;
   }
 
@@ -173,8 +173,6 @@ class Tuner {
 };
 
 }  // namespace
-
-const char *to_string(Judge judge) { return judge == Judge::Simulation ? "simulation" : "bounds"; }
 
 std::optional<Tuned> tune(const Workload &workload, const TuneOptions &options) {
   return Tuner(workload, options).run();

@@ -21,14 +21,8 @@
 
 namespace redag::lab {
 
-enum class Judge : std::uint8_t { Simulation, Bounds };
-
-/// "simulation" or "bounds".
-[[nodiscard]] const char *to_string(Judge judge);
-
 struct TuneOptions {
   Judge judge = Judge::Simulation;
-  Objective objective = Objective::Misses;
   Freedom freedom;
   Simulation simulation;
   std::optional<Overheads> machine;  // charged to the bounds instead of the simulated overheads
@@ -63,7 +57,7 @@ struct Tuned {
 };
 
 /// Tunes a workload. Requires a valid workload, and at least one seed for simulations. The result is never worse than
-/// `workload` by the goal, neither on the seeds of the search nor on the unseen ones. Returns nothing if stopped before
+/// `workload` for the judge, neither on the seeds of the search nor on the unseen ones. Returns nothing if stopped before
 /// `workload` itself was judged.
 [[nodiscard]] std::optional<Tuned> tune(const Workload &workload, const TuneOptions &options);
 

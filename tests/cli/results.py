@@ -383,19 +383,10 @@ dags:
         self.assertIn("differs max_active of wide: none -> 1", differs)
         self.assertIn("better quick: missed", differs)
 
-    def test_objectives(self):
-        file = self.write("wide.yaml", self.WIDE)
-        options = ["--duration", "2s", "--seeds", "2"]
-        text = self.expect(redag("tune", file, "--objective", "lateness", *options), 0).stdout
-        self.assertIn("objective: lateness", text)
-        self.assertRegex(text, r"lateness, on unseen seeds: \d+ lost, .* -> 0 lost, -")
-        text = self.expect(redag("tune", file, "--objective", "slack", *options), 0).stdout
-        self.assertRegex(text, r"slack, on unseen seeds: \d+ lost, -[\d.]+ % -> 0 lost, [\d.]+ %")
-
     def test_json_is_the_same_for_every_number_of_processors(self):
         file = self.write("wide.yaml", self.WIDE)
         one = redag("tune", file, "--jobs", "1", "--duration", "2s", "--json")
-        document = self.document(one, "redag.tuning/3")
+        document = self.document(one, "redag.tuning/4")
         self.assertEqual(body(one.stdout), body(redag("tune", file, "--jobs", "3", "--duration", "2s", "--json").stdout))
         self.assertEqual(document["best"]["max_active"], {"wide": 1, "quick": 0})
 
@@ -403,7 +394,7 @@ dags:
         paper = SOURCE / "workloads" / "paper" / "harmonic_u08.yaml"
         result = redag("tune", paper, "--vary", "max_active", "--caps", "2-5", "--duration", "2s",
                        "--seeds", "1", "--held-out", "1", "--json")
-        trials = self.document(result, "redag.tuning/3")["trials"]
+        trials = self.document(result, "redag.tuning/4")["trials"]
         pairs = sorted((trial["max_active"]["dag1"], trial["max_active"]["dag2"]) for trial in trials)
         self.assertEqual(pairs, [(a, b) for a in range(2, 6) for b in range(2, 6)])
 
@@ -421,7 +412,7 @@ dags:
     def test_bad_input(self):
         self.expect(redag("tune"), 2, "FILE is required")
         self.expect(redag("tune", self.write("bad.yaml", MISTAKEN)), 2, "bad.yaml:6")
-        self.expect(redag("tune", self.cart, "--objective", "misess"), 2, "did you mean 'misses'?")
+        self.expect(redag("tune", self.cart, "--judge", "bound"), 2, "did you mean 'bounds'?")
         self.expect(redag("tune", self.cart, "--vary", "worker"), 2, "did you mean 'workers'?")
         self.expect(redag("tune", self.cart, "--caps", "5-2"), 2, "write it as 2-5")
         self.expect(redag("tune", self.cart, "--seeds", "0"), 2, "--seeds")

@@ -27,7 +27,6 @@ struct TuneOptions {
   RunArguments run;
   lab::TuneOptions tune;
   std::string output;
-  std::optional<lab::Objective> objective;
   std::string vary;  // empty: as the judge has it
   std::string caps;
   bool all_trials = false;
@@ -87,7 +86,6 @@ int tune_file(const TuneOptions &options, Console &console) {
   Tuning tuning;
   tuning.options = options.tune;
   const bool by_bounds = options.tune.judge == lab::Judge::Bounds;
-  tuning.options.objective = options.objective.value_or(by_bounds ? lab::Objective::Lateness : lab::Objective::Misses);
   if (by_bounds) tuning.options.held_out = 0;
   tuning.options.effort.seed = options.run.seed;
   tuning.options.seed = options.run.seed;
@@ -158,12 +156,8 @@ Action add_tune(CLI::App &app) {
   app.add_option("-o,--output", options->output, "File for the tuned workload: FILE with its changes")
       ->type_name("FILE");
   add_choice(app, "--judge", tune.judge, choices_of(std::array{lab::Judge::Simulation, lab::Judge::Bounds}),
-             "What decides which setting is better: simulated runs, or the bounds of 'redag analyze' alone")
+             "What decides which setting is better: the misses in simulated runs, or the bounds of 'redag analyze' alone")
       ->default_str(to_string(tune.judge));
-  add_choice(app, "--objective", options->objective,
-             choices_of(std::array{lab::Objective::Misses, lab::Objective::Lateness, lab::Objective::Slack}),
-             "Minimise late and lost jobs (misses) or the largest lateness (lateness), or maximise the smallest share "
-             "of a deadline that is left (slack); by default misses, or lateness with the bounds as judge");
   app.add_option("--vary", options->vary,
                  "What may change: workers, max_active, priorities; by default workers,max_active, or "
                  "max_active,priorities with the bounds as judge")

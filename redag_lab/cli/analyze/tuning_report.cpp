@@ -10,6 +10,7 @@
 #include <span>
 
 #include "redag/base/text.hpp"
+#include "redag/base/words.hpp"
 #include "redag_analysis/text/table.hpp"
 #include "redag_lab/workload/changes.hpp"
 
@@ -17,7 +18,6 @@ namespace redag::cli {
 namespace {
 
 using lab::Judge;
-using lab::Objective;
 using lab::Point;
 using lab::Score;
 using lab::SettingCandidate;
@@ -26,16 +26,9 @@ using lab::Tuned;
 
 constexpr std::size_t kMostTrials = 10;
 
-// Returns "-2.5 ms"; "-" if nothing was seen.
-std::string lateness_text(const lab::Extremes &extremes) {
-  if (!extremes.any) return "-";
-  const Duration lateness = extremes.worst_lateness;
-  return lateness < 0 ? "-" + humanize_duration(-lateness) : humanize_duration(lateness);
-}
-
 // Returns "12.3 %", rounded down so as not to overstate it; "-" if nothing was seen.
-std::string slack_text(const lab::Extremes &extremes) {
-  return extremes.any ? fmt::format("{:.1f} %", std::floor(extremes.least_slack * 1000 + 1e-9) / 10) : "-";
+std::string slack_text(const Score &score) {
+  return score.slack ? fmt::format("{:.1f} %", std::floor(*score.slack * 1000 + 1e-9) / 10) : "-";
 }
 
 // Returns "control 1, lidar none": max_active by DAG. A DAG of one task without a bound has no choice and is left out.
@@ -57,19 +50,17 @@ std::string miss_text(const Score &score) {
                            : fmt::format("{} ({})", format_count(score.missed), format_percent(miss_ratio(score)));
 }
 
-std::string objective_text(const Score &score, const lab::TuneOptions &options) {
-  if (options.objective == Objective::Misses) return miss_text(score);
-  return fmt::format(
-      "{} {}, {}", format_count(score.lost), options.judge == Judge::Bounds ? "without a bound" : "lost",
-      options.objective == Objective::Lateness ? lateness_text(score.extremes) : slack_text(score.extremes));
+// Returns what decides between two settings.
+std::string goal_text(const Score &score, const lab::TuneOptions &options) {
+  if (options.judge == Judge::Simulation) return miss_text(score);
+  return fmt::format("{} without a bound, {}", format_count(score.lost), slack_text(score));
 }
 
 std::vector<Cell> score_cells(const Score &score) {
   return {{score.proven ? "yes" : "no", score.proven ? Tint::Good : Tint::Plain},
           {miss_text(score), score.missed > 0 ? Tint::Bad : Tint::Good},
           {format_count(score.lost)},
-          {lateness_text(score.extremes)},
-          {slack_text(score.extremes)}};
+          {slack_text(score)}};
 }
 
 // Returns the columns of score_cells(). Jobs miss deadlines; of bounds, deadlines are not shown to be met.
@@ -78,8 +69,7 @@ std::vector<Column> score_columns(const Tuning &tuning) {
   return {{"proven", false, 5},
           {by_bounds ? "not shown" : "missed", true, 8},
           {by_bounds ? "no bound" : "lost", true, 2},
-          {by_bounds ? "worst lateness" : "max lateness", true, 7},
-          {"least slack", true, 6}};
+          {"least slack", true, 7}};
 }
 
 Table table_of(std::vector<Column> columns, const Tuning &tuning) {
@@ -110,7 +100,7 @@ using Ranked = std::vector<std::pair<Point, Score>>;
 Ranked ranked(const Tuning &tuning) {
   Ranked trials(tuning.tuned.trials.begin(), tuning.tuned.trials.end());
   std::stable_sort(trials.begin(), trials.end(), [&](const auto &a, const auto &b) {
-    return lab::is_better(a.second, b.second, tuning.options.objective);
+    return lab::is_better(a.second, b.second, tuning.options.judge);
   });
   return trials;
 }
@@ -145,17 +135,16 @@ std::string tried_tables(const Tuning &tuning, const StreamTraits &terminal, boo
 
 std::string gains(const Tuning &tuning) {
   const Tuned &tuned = tuning.tuned;
-  const Objective objective = tuning.options.objective;
   const bool held = tuning.options.held_out > 0;
   const Score &before = held ? tuned.present.held_out : tuned.present.score;
   const Score &after = held ? tuned.found.held_out : tuned.found.score;
   std::string text;
   if (!before.proven && after.proven) text += "gain: the bounds now prove that every deadline is met\n";
-  text += fmt::format("{}, {}: {} -> {}\n", to_string(objective),
-                      tuning.options.judge == Judge::Bounds ? "by the bounds"
-                      : held                                ? "on unseen seeds"
-                                                            : "on the seeds of the search (no validation)",
-                      objective_text(before, tuning.options), objective_text(after, tuning.options));
+  text += fmt::format("{}: {} -> {}\n",
+                      tuning.options.judge == Judge::Bounds ? "least slack, by the bounds"
+                      : held                                ? "misses, on unseen seeds"
+                                                            : "misses, on the seeds of the search (no validation)",
+                      goal_text(before, tuning.options), goal_text(after, tuning.options));
   return text;
 }
 
@@ -164,8 +153,7 @@ Json score_json(const Score &score) {
               {"released", score.judged},
               {"missed", score.missed},
               {"lost", score.lost},
-              {"max_lateness_ns", score.extremes.any ? Json(score.extremes.worst_lateness) : Json()},
-              {"least_slack", score.extremes.any ? Json(score.extremes.least_slack) : Json()}};
+              {"least_slack", score.slack ? Json(*score.slack) : Json()}};
 }
 
 Json setting_json(const Tuning &tuning, const Point &point) {
@@ -200,11 +188,11 @@ std::string in_words(const Tuning &tuning) {
     text += gains(tuning);
   } else if (tuned.rejected()) {
     text += "nothing to change: the best setting of the search is worse on the unseen seeds\n" + gains(tuning);
-  } else if (tuning.options.judge == Judge::Bounds && !tuned.present.score.extremes.any) {
+  } else if (tuning.options.judge == Judge::Bounds && !tuned.present.score.slack) {
     text += "nothing to compare: no method bounds any response time, whatever was tried; see 'redag analyze'\n";
   } else {
-    text += fmt::format("nothing to change: no other setting that was tried is better by {}\n",
-                        to_string(tuning.options.objective));
+    text += fmt::format("nothing to change: no other setting that was tried {}\n",
+                        tuning.options.judge == Judge::Bounds ? "has better bounds" : "misses fewer deadlines");
   }
   if (!tuned.exhaustive) {
     text +=
@@ -218,8 +206,7 @@ std::string describe(const Tuning &tuning, const StreamTraits &terminal, bool al
   const Workload &workload = tuning.tuned.present.workload;
   const lab::TuneOptions &options = tuning.options;
   std::string text =
-      fmt::format("{}: {}, {} worker{}; objective: {}\n", workload.name, to_string(workload.policy),
-                  workload.platform.workers, workload.platform.workers == 1 ? "" : "s", to_string(options.objective));
+      fmt::format("{}: {}, {}\n", workload.name, to_string(workload.policy), plural(workload.platform.workers, "worker"));
   if (options.judge == Judge::Bounds) {
     text += "judged by the bounds, which hold for every execution\n\n";
   } else {
@@ -246,10 +233,9 @@ Json to_json(const Tuning &tuning) {
     row.update(score_json(score));
     trials.push_back(std::move(row));
   }
-  return Json{{"format", "redag.tuning/3"},
+  return Json{{"format", "redag.tuning/4"},
               {"workload", tuned.present.workload.name},
               {"judge", to_string(options.judge)},
-              {"objective", to_string(options.objective)},
               {"duration_ns", options.simulation.duration},
               {"seed", options.seed},
               {"seeds", options.seeds},

@@ -27,7 +27,7 @@ struct Tuning {
 /// `all`: every combination tried.
 [[nodiscard]] std::string describe(const Tuning &tuning, const StreamTraits &terminal, bool all);
 
-/// Returns `redag.tuning/3`.
+/// Returns `redag.tuning/4`.
 [[nodiscard]] Json to_json(const Tuning &tuning);
 
 }  // namespace redag::cli

@@ -19,7 +19,6 @@ Workload short_deadline() {
 Tuning by_bounds(const Workload &workload) {
   Tuning tuning;
   tuning.options.judge = lab::Judge::Bounds;
-  tuning.options.objective = lab::Objective::Lateness;
   tuning.options.freedom.workers = false;
   tuning.options.freedom.priorities = true;
   tuning.options.held_out = 0;
@@ -32,11 +31,11 @@ TEST(TuningReport, TellsChangesAndGainsByBounds) {
   EXPECT_EQ(changes(tuning.tuned), std::vector<std::string>{"policy: rate_monotonic -> deadline_monotonic"});
   const std::string words = in_words(tuning);
   EXPECT_NE(words.find("gain: the bounds now prove that every deadline is met\n"), std::string::npos) << words;
-  EXPECT_NE(words.find("lateness, by the bounds: 0 without a bound, 1ms -> 0 without a bound, -2ms\n"),
+  EXPECT_NE(words.find("least slack, by the bounds: 0 without a bound, -25.0 % -> 0 without a bound, 50.0 %\n"),
             std::string::npos)
       << words;
   const Json document = to_json(tuning);
-  EXPECT_EQ(document["best"]["searched"]["max_lateness_ns"], -2 * kMillisecond);
+  EXPECT_EQ(document["best"]["searched"]["least_slack"], 0.5);
   EXPECT_EQ(document["best"]["priorities"], "deadline_monotonic");
   EXPECT_EQ(document["present"]["searched"]["proven"], false);
 }

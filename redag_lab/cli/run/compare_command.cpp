@@ -12,7 +12,6 @@
 
 #include "redag/base/text.hpp"
 #include "redag/model/waits.hpp"
-#include "redag/trace/events_file.hpp"
 #include "redag_lab/cli/run/compare_recorded.hpp"
 #include "redag_lab/cli/run/comparison_report.hpp"
 #include "redag_lab/cli/run/run_arguments.hpp"
