@@ -83,7 +83,7 @@ class Serve(Case):
         return next(event for event in self.events(path) if is_wanted(event))
 
     def test_without_the_token_there_is_nothing(self):
-        for path in ("/", "/live.js", "/style.css", "/echarts.js", "/events", "/metrics", "/nothing", "/?token=", "/?token=" + "0" * 64,
+        for path in ("/", "/live.js", "/style.css", "/events", "/metrics", "/nothing", "/?token=", "/?token=" + "0" * 64,
                      "/events?token=" + self.token, "/live.js?token=" + self.token):
             response = self.ask(path, token=False)
             self.assertEqual(response.status, 403, path)

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Takes the pictures of pages that the documentation shows, or compares them with the pages as they are now. The pages
-// of runs are of virtual time, and the live page shows recorded states (live.json): the same program draws the same.
+// of runs are of virtual time, and the live page shows a recorded state (live.json): the same program draws the same.
 //   pictures.mjs CHROMIUM SCRATCH REDAG SOURCE check|take|record      record: takes them, with new states of a run
 import assert from 'node:assert/strict';
 import {spawn} from 'node:child_process';
@@ -42,7 +42,7 @@ async function opened(address, [width, height], isReplayed = false) {
   return page;
 }
 
-/** Records what redag serve sends about a run: its last state, and the percentiles of the states before it. */
+/** Records what redag serve sends about a run: its last state. */
 async function record(seconds) {
   const folder = fs.mkdtempSync('/dev/shm/redag-pictures-');
   const run = start('run', path.join(source, 'workloads', 'robot.yaml'), '--duration', '1h', '--json');
@@ -51,13 +51,13 @@ async function record(seconds) {
   fs.linkSync(path.join('/dev/shm', live), path.join(folder, live));
   const page = await opened(await serve(folder), PICTURES.serve);
   const recorded = await page.evaluate((wanted) => new Promise((done) => {
-    const course = [];
+    let count = 0;
     const events = new EventSource('events');
     events.onmessage = ({data}) => {
       const state = JSON.parse(data);
       if (state.frame === null) return;
-      course.push({up_ns: state.frame.up_ns, p99_ns: state.frame.dags.map(({recent}) => recent.response.p99_ns)});
-      if (course.length === wanted) done({state, course});
+      count += 1;
+      if (count === wanted) done(state);
     };
   }), seconds);
   await page.close();
@@ -65,14 +65,11 @@ async function record(seconds) {
   fs.writeFileSync(states, `${JSON.stringify(recorded)}\n`);
 }
 
-/** Replaces the connection to the server by the recorded states. */
-function replay({state, course}) {
+/** Replaces the connection to the server by the recorded state. */
+function replay(state) {
   window.EventSource = class {
     constructor() {
-      setTimeout(() => course.forEach(({up_ns, p99_ns}) => {
-        const dags = state.frame.dags.map((dag, i) => ({...dag, recent: {...dag.recent, response: {...dag.recent.response, p99_ns: p99_ns[i]}}}));
-        this.onmessage({data: JSON.stringify({...state, frame: {...state.frame, up_ns, dags}})});
-      }));
+      setTimeout(() => this.onmessage({data: JSON.stringify(state)}));
     }
 
     close() {}

@@ -41,7 +41,7 @@ struct ServeArguments {
   std::string token_file;
 };
 
-// A page of this server loads what this server serves, and nothing else. ECharts sets styles of elements.
+// A page of this server loads what this server serves, and nothing else. Bars have their length in an attribute.
 constexpr const char *kPolicy =
     "default-src 'none'; script-src 'self'; style-src 'self'; style-src-attr 'unsafe-inline'; connect-src 'self'; "
     "img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
@@ -56,7 +56,6 @@ std::vector<Asset> assets() {
   namespace files = report::assets;
   return {{"/", "text/html; charset=utf-8", files::kLiveTemplate},
           {"/style.css", "text/css; charset=utf-8", files::kLiveStyle},
-          {"/echarts.js", "text/javascript; charset=utf-8", files::kEcharts},
           {"/live.js", "text/javascript; charset=utf-8", files::kLiveScript}};
 }
 

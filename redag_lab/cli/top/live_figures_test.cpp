@@ -117,8 +117,6 @@ TEST(LiveJson, HasWhatIsShown) {
   frame.dags[0].deadline = 5 * kMillisecond;
   frame.dags[0].late = 3;
   frame.dags[0].recent_late = 1;
-  frame.tasks[0].spread.all[0] = 7;
-  frame.tasks[0].spread.all[20] = 5;
   frame.threads_in_all = 2;
   frame.threads = {{.index = 0, .used = kSecond, .recent_used = kSecond, .task = 2}, {.index = 1}};
   const Json document = to_json(listed, *listed.page, 21 * kSecond);
@@ -129,8 +127,6 @@ TEST(LiveJson, HasWhatIsShown) {
   EXPECT_EQ(document["tasks"][0]["bound_ns"], 2 * kMillisecond);
   EXPECT_EQ(document["tasks"][1]["bound_ns"], nullptr);
   EXPECT_EQ(document["tasks"][1]["rate"], 20.0);
-  EXPECT_EQ(document["tasks"][0]["histogram"]["all"], Json::parse("[[0, 7], [1048576, 5]]"));
-  EXPECT_EQ(document["tasks"][0]["histogram"]["recent"], Json::array());
   EXPECT_EQ(document["dags"][0]["max_active"], 1);
   EXPECT_EQ(document["dags"][0]["deadline_ns"], 5 * kMillisecond);
   EXPECT_EQ(document["dags"][1]["deadline_ns"], nullptr);

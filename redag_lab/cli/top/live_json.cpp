@@ -36,19 +36,6 @@ Json figures_json(const live::page::Figures &f, const live::Frame &frame) {
           {"waiting", f.waiting}};
 }
 
-/// Returns the classes that are not empty: [[least_ns, count], ...].
-Json classes_json(const std::uint32_t (&counts)[live::page::kClasses]) {
-  Json classes = Json::array();
-  for (std::size_t i = 0; i < live::page::kClasses; ++i) {
-    if (counts[i] > 0) classes.push_back({i == 0 ? 0 : live::page::least_in(i), counts[i]});
-  }
-  return classes;
-}
-
-Json histogram_json(const live::page::Spread &spread) {
-  return {{"recent", classes_json(spread.recent)}, {"all", classes_json(spread.all)}};
-}
-
 Json device_json(const live::DeviceFrame &device, const live::Frame &frame) {
   Json tasks = Json::array();
   for (const std::uint32_t task : device.tasks) tasks.push_back(full_name(frame.tasks[task], frame));
@@ -67,8 +54,7 @@ Json device_json(const live::DeviceFrame &device, const live::Frame &frame) {
 Json task_json(const live::TaskFrame &task, const live::Frame &frame) {
   Json row = {{"dag", frame.dags[task.dag].name},        {"name", task.name},
               {"period_ns", or_null(task.period)},       {"deadline_ns", or_null(task.deadline)},
-              {"bound_ns", or_null(task.bound)},         {"priority", or_null(task.priority)},
-              {"histogram", histogram_json(task.spread)}};
+              {"bound_ns", or_null(task.bound)},         {"priority", or_null(task.priority)}};
   row.update(figures_json(task.figures, frame));
   return row;
 }
@@ -112,8 +98,11 @@ Json to_json(const live::Listed &listed, const live::Page &page, Time now) {
   }
   for (const live::DeviceFrame &device : frame.devices) document["devices"].push_back(device_json(device, frame));
   for (const live::DagFrame &dag : frame.dags) {
-    Json row = {{"name", dag.name}, {"max_active", dag.max_active},   {"deadline_ns", or_null(dag.deadline)},
-                {"late", dag.late}, {"recent_late", dag.recent_late}, {"histogram", histogram_json(dag.spread)}};
+    Json row = {{"name", dag.name},
+                {"max_active", dag.max_active},
+                {"deadline_ns", or_null(dag.deadline)},
+                {"late", dag.late},
+                {"recent_late", dag.recent_late}};
     row.update(figures_json(dag.figures, frame));
     document["dags"].push_back(std::move(row));
   }

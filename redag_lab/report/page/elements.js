@@ -16,14 +16,6 @@ function element(kind, attributes = {}, ...children) {
   return node;
 }
 
-const SVG = 'http://www.w3.org/2000/svg';
-function svgElement(tag, attributes, ...children) {
-  const node = document.createElementNS(SVG, tag);
-  for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
-  node.append(...children);
-  return node;
-}
-
 /** Makes the children of a node look like fresh ones. Equal ones stay, with focus, selection and scrolling. */
 function patch(node, fresh) {
   fresh.forEach((wanted, i) => {

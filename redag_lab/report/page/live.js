@@ -20,7 +20,6 @@ const pick = element('label', {}, 'executor', picker);
 const workers = element('div.workers');
 const devices = table('Devices', DEVICE_COLUMNS, []);
 const deviceSection = element('div', {}, element('h2', {id: 'devices'}, 'Devices'), devices);
-const course = courseFigure();
 const rows = table('DAGs and tasks', LIVE_COLUMNS, [], {most: 200});  // a browser is slow with more
 const content = element('div');
 
@@ -79,12 +78,8 @@ function receive({data}) {
   live.list = list.executors;
   live.lost = false;
   live.gone = frame === null;
-  if (frame !== null) {
-    if (live.frame === null || live.frame.pid !== frame.pid || live.frame.number !== frame.number) course.clear();
-    live.frame = frame;
-  }
+  if (frame !== null) live.frame = frame;
   show();
-  if (frame !== null) course.update(frame);
   document.documentElement.dataset.ready = 'true';
 }
 
@@ -112,12 +107,12 @@ const ROWS = ['all', 'DAGs', 'tasks'];
 content.append(misses, alarm, workers, deviceSection, element('h2', {id: 'table'}, 'DAGs and tasks'),
   element('div.row.controls', {}, filter, choice('Response times', ['of the last seconds', 'since the start'], 0, (i) => { view.whole = i === 1; show(); }),
     choice('Rows', ROWS, 0, (i) => { view.rows = ROWS[i]; show(); })),
-  rows, element('h2', {id: 'course'}, 'Response times lately'), course.box);
+  rows);
 content.hidden = true;
 document.documentElement.dataset.theme = themeName();
 document.getElementById('report').append(
   element('div.head', {}, element('div.title', {}, title, badge), element('div.controls', {}, themeChoice())), facts, element('div.row', {}, pick), content,
-  element('footer', {}, `This page is served by redag serve on this machine; it changes nothing. Chart: Apache ECharts ${echarts.version} (Apache License 2.0).`));
+  element('footer', {}, 'This page is served by redag serve on this machine; it changes nothing.'));
 applyTheme();
 show();
 watch(null);
