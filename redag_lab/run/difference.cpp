@@ -29,8 +29,6 @@ Duration stretch_length(Duration run, Duration period) {
 
 bool is_row(const DifferenceSide::Row &a, const DifferenceSide::Row &b) { return a.dag == b.dag && a.task == b.task; }
 
-std::string name_of(const DifferenceSide::Row &row) { return row.task.empty() ? row.dag : row.dag + "." + row.task; }
-
 using Jobs = DifferenceSide::Jobs;
 
 void add(Jobs &sum, const Jobs &jobs) {
@@ -189,12 +187,8 @@ void DifferenceSide::count(const metrics::JobRecord &job) {
     if (miss != metrics::Miss::None) ++here.missed;
   }
   if (job.outcome != metrics::JobOutcome::Finished) return;
-  const auto respond = [&](Row &row, Duration response) {
-    row.max = std::max(row.max, response);
-    row.runs.back()[at].responses.push_back(response);
-  };
-  respond(rows_[places.task], job.response());
-  if (places.end_to_end) respond(rows_[*places.end_to_end], job.finish - job.origin);
+  rows_[places.task].runs.back()[at].responses.push_back(job.response());
+  if (places.end_to_end) rows_[*places.end_to_end].runs.back()[at].responses.push_back(job.finish - job.origin);
 }
 
 bool DifferenceSide::Row::has_responses() const {
@@ -224,23 +218,17 @@ Difference compare_sides(const DifferenceSide &a, const DifferenceSide &b, doubl
   for (const DifferenceSide::Row &row : a.rows()) {
     if (const DifferenceSide::Row *other = find_in(b, row)) {
       compare_rows(difference.rows.emplace_back(DifferenceRow{&row, other, {}, {}}), difference.of_runs, tolerance);
-    } else {
-      difference.missing.push_back(name_of(row));
     }
-  }
-  for (const DifferenceSide::Row &row : b.rows()) {
-    if (find_in(a, row) == nullptr) difference.missing.push_back(name_of(row));
   }
 
   std::vector<double> p_values;
   for_each_figure(difference.rows, [&](const FigureDifference &figure) {
     if (figure.p) p_values.push_back(*figure.p);
   });
-  difference.tests = p_values.size();
-  difference.threshold = discovery_threshold(std::move(p_values));
+  const double threshold = discovery_threshold(std::move(p_values));
   for_each_figure(difference.rows, [&](FigureDifference &figure) {
     if (!figure.p) return;
-    const bool differs = *figure.p <= difference.threshold;
+    const bool differs = *figure.p <= threshold;
     figure.verdict = !differs ? Verdict::Same : figure.is_more ? Verdict::Worse : Verdict::Better;
   });
   return difference;

@@ -49,10 +49,9 @@ class DifferenceSide {
     std::string dag;   // empty: all DAGs together
     std::string task;  // empty: the whole DAG
     metrics::JobCounts jobs;
-    /// For a task the largest f - r; for a DAG with one sink the largest f - origin there (end to end). It is 0 if none
-    /// finished, and for rows without a response of their own: all DAGs together, or a DAG with several sinks.
-    Duration max = 0;
-    std::vector<std::vector<Jobs>> runs;  // by run, then by stretch; with the responses that `max` refers to
+    /// By run, then by stretch. Responses are f - r of a task, and f - origin of a DAG with one sink (end to end). All
+    /// DAGs together have none, nor has a DAG with several sinks.
+    std::vector<std::vector<Jobs>> runs;
 
     [[nodiscard]] bool has_responses() const;
   };
@@ -110,10 +109,7 @@ struct DifferenceRow {
 
 struct Difference {
   std::vector<DifferenceRow> rows;   // rows that both sides have, in the order of A
-  std::vector<std::string> missing;  // rows that only one side has
   bool of_runs = false;              // whole runs were compared, and not stretches of them
-  std::size_t tests = 0;
-  double threshold = 0;  // the largest p-value that counts, over all tests together
 
   [[nodiscard]] bool is_any(Verdict verdict) const;
 };

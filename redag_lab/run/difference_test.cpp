@@ -91,7 +91,14 @@ TEST(Difference, ADagAnswersEndToEndAndAllJobsTogetherDoNot) {
   EXPECT_EQ(responses(a.rows()[0]), 0U);
   EXPECT_FALSE(a.rows()[0].has_responses());
   EXPECT_EQ(responses(a.rows()[3]), responses(a.rows()[5])) << "those of its sink alone";
-  EXPECT_GT(a.rows()[3].max, a.rows()[4].max + 3 * kMillisecond) << "`after` takes that long after `slow`";
+  const auto longest = [](const DifferenceSide::Row &row) {
+    Duration most = 0;
+    for (const DifferenceSide::Jobs &stretch : row.runs[0]) {
+      for (const Duration response : stretch.responses) most = std::max(most, response);
+    }
+    return most;
+  };
+  EXPECT_GT(longest(a.rows()[3]), longest(a.rows()[4]) + 3 * kMillisecond) << "`after` takes that long after `slow`";
 }
 
 TEST(Difference, ADagWithSeveralSinksHasNoResponse) {
@@ -133,10 +140,9 @@ TEST(Difference, OtherSeedsOfTheSameAreTheSame) {
   EXPECT_LE(differing, 2);
 }
 
-TEST(Difference, RowsOfOneSideAreNamed) {
+TEST(Difference, RowsOfOneSideAreLeftOut) {
   const Difference difference =
       compare_sides(side(sched::Preemption::None, 1), side(sched::Preemption::None, 1, 2, "c"), kTolerance);
-  EXPECT_THAT(difference.missing, ElementsAre("b", "b.slow", "b.after", "c", "c.slow", "c.after"));
   EXPECT_EQ(difference.rows.size(), 3U);
 }
 
@@ -146,7 +152,6 @@ TEST(Difference, ShortRunsAreNotTested) {
   DifferenceSide b;
   b.add(run_of(contention(), sched::Preemption::Full, 1, kSecond));
   const Difference difference = compare_sides(a, b, kTolerance);  // 5 stretches of 200 ms
-  EXPECT_EQ(difference.tests, 0U);
   EXPECT_EQ(difference.rows[2].miss_ratio.verdict, Verdict::NotTested);
 }
 

@@ -42,26 +42,19 @@ class CompareResults(Case):
         self.assertNotIn("plan", equal.stdout)
         self.assertRegex(equal.stdout, r"\(\d+ figures without a difference; --all-tasks shows all\)")
         self.assertIn("same slow.plan: missed 0", redag("compare", none, none, "--all-tasks").stdout)
-        document = self.document(redag("compare", none, full, "--json"), "redag.difference/3")
-        self.assertEqual(document["changes"], [{"kind": "setting", "what": "preemption", "a": "none", "b": "os"}])
-        self.assertEqual([row["task"] for row in document["rows"]], [None, None, "sense", "act", None, "plan"])
-        self.assertTrue(document["worse"] and document["better"])
-        self.assertEqual(body(redag("compare", none, full, "--json").stdout), body(redag("compare", none, full, "--json").stdout))
 
     def test_repetitions(self):
         file = self.write("random.yaml", CART.replace("wcet: 1ms, period", "wcet: 1ms, bcet: 1us, period"))
         folder = self.folder / "cmp"
         self.expect(redag("compare", file, "--simulate", "--duration", "20s", "--repeat", "3", "--executors",
                           "redag,mte", "--out", folder), 0)
-        result = redag("compare", folder / "mte", folder / "redag", "--json")
-        self.assertEqual(self.document(result, "redag.difference/3")["a"]["seeds"], [1, 2, 3])
+        result = self.expect(redag("compare", folder / "mte", folder / "redag"), 0)
+        self.assertEqual(result.stdout.count("3 runs of 20s"), 2)
         self.expect(redag("compare", folder, folder / "mte"), 2, "holds runs of several kinds: redag, mte", "name one of them")
         # Repetitions in folders of other names, as run_workload of redag_rclcpp_lab writes them.
         for n in 1, 2, 3:
             (folder / "redag" / f"repetition-{n}").rename(folder / "redag" / str(n))
-        again = self.document(redag("compare", folder / "mte", folder / "redag", "--json"), "redag.difference/3")
-        self.assertEqual(again["b"]["seeds"], [1, 2, 3])
-        self.assertEqual(again["rows"], json.loads(result.stdout)["rows"])
+        self.assertEqual(self.expect(redag("compare", folder / "mte", folder / "redag"), 0).stdout, result.stdout)
 
     def test_other_workload(self):
         one = self.results("one")
@@ -91,6 +84,7 @@ class CompareResults(Case):
         one = self.results("one")
         self.expect(redag("compare", one), 2, "is a folder: name the result to compare it with")
         self.expect(redag("compare", one, one, "--repeat", "2"), 2, "--repeat is for runs")
+        self.expect(redag("compare", one, one, "--json"), 2, "--json is for runs")
         self.expect(redag("compare", self.cart, "--different"), 2, "--different")
         self.expect(redag("compare", one, self.folder / "nowhere"), 2, "nowhere")
         (self.folder / "empty").mkdir()

@@ -133,7 +133,6 @@ class Comparing {
     const WrittenFiles written = write_session(session, {.folder = folder});
     console_.note(written.problems);
     all_written_ = all_written_ && written.problems.empty();
-    has_picture_ = written.has_picture;
     return true;
   }
 
@@ -174,38 +173,15 @@ class Comparing {
         console_.note(written.error());
         all_written_ = false;
       }
-      say_what_was_written(folder);
+      const std::string words =
+          fmt::format("\n{0}/comparison.json: every repetition; 'redag report {0}' makes a page\n", folder);
+      options_.run.json ? console_.note(words) : console_.say(words);
     }
     if (!all_written_) return kExitBad;
     const bool violated = std::any_of(results_.begin(), results_.end(),
                                       [](const lab::ExecutorResults &results) { return results.check_violations > 0; });
     const bool missed = compared.executors.front().has_misses();
     return violated || (options_.run.check && missed) ? kExitNo : kExitOk;
-  }
-
-  void say_what_was_written(const std::string &folder) {
-    const std::string first = fmt::format("{}/{}/repetition-1", folder, results_.front().variant.name);
-    std::string text = fmt::format(
-        "\n"
-        "Open these files:\n"
-        "  {}/comparison.json\n"
-        "      this comparison, with every repetition\n",
-        folder);
-    if (has_picture_) {
-      text += fmt::format(
-          "  {}/trace.pftrace\n"
-          "      the schedule, for https://ui.perfetto.dev\n",
-          first);
-    }
-    text += fmt::format(
-        "  {}/summary.json, {}\n"
-        "      every job; the folders beside it hold the other executors\n",
-        first, trace::kEventsFile);
-    if (options_.run.json) {
-      console_.note(text);
-    } else {
-      console_.say(text);
-    }
   }
 
   const CompareOptions &options_;
@@ -217,12 +193,11 @@ class Comparing {
   std::vector<lab::ExecutorResults> results_;
   std::vector<std::string> warnings_;
   bool all_written_ = true;
-  bool has_picture_ = false;
 };
 
 // Returns the first option given that only runs take; empty: none.
 std::string option_of_runs(const CLI::App &app) {
-  const std::set<std::string> fits = {"FILE", "B", "--tolerance", "--different", "--all-tasks", "--json", "--check"};
+  const std::set<std::string> fits = {"FILE", "B", "--tolerance", "--different", "--all-tasks", "--check"};
   for (const CLI::Option *option : app.get_options()) {
     if (option->count() > 0 && !fits.contains(option->get_name())) return option->get_name();
   }
@@ -238,7 +213,6 @@ int compare_results(const CompareOptions &options, const CLI::App &app, Console 
   CompareRecordedOptions recorded = options.recorded;
   recorded.a = options.run.file;
   recorded.check = options.run.check;
-  recorded.json = options.run.json;
   return compare_recorded(recorded, console);
 }
 

@@ -41,11 +41,7 @@ class RecordedComparison {
     progress_.draw(1, "comparing");
     diffed_.difference = lab::compare_sides(diffed_.a.jobs, diffed_.b.jobs, diffed_.tolerance);
     progress_.clear();
-    if (options_.json) {
-      console_.print(to_text(to_json(diffed_)));
-    } else {
-      console_.say(describe(diffed_, console_.out_traits(), options_.all_tasks));
-    }
+    console_.say(describe(diffed_, console_.out_traits(), options_.all_tasks));
     return options_.check && diffed_.difference.is_any(lab::Verdict::Worse) ? kExitNo : kExitOk;
   }
 

@@ -17,7 +17,6 @@ struct CompareRecordedOptions {
   double tolerance = 0.05;  // share by which response percentiles may differ
   bool different = false;   // of different workloads too
   bool check = false;
-  bool json = false;
   bool all_tasks = false;
 };
 

@@ -138,39 +138,6 @@ std::vector<std::string> cautions(const Diffed &diffed) {
   return list;
 }
 
-Json figure_json(const DifferenceRow &row, std::size_t f) {
-  const FigureDifference &figure = figure_of(row, f);
-  const auto of_side = [&](const DifferenceSide::Row &side, double number) {
-    return f == kMissed || side.has_responses() ? Json(number) : Json();
-  };
-  return Json{{"a", of_side(*row.a, figure.a)},
-              {"b", of_side(*row.b, figure.b)},
-              {"p", figure.p ? Json(*figure.p) : Json()},
-              {"verdict", to_string(figure.verdict)}};
-}
-
-Json counts_json(const DifferenceSide::Row &row) {
-  return Json{{"released", row.jobs.released},
-              {"late", row.jobs.late},
-              {"lost", row.jobs.lost()},
-              {"missed", row.jobs.missed()},
-              {"max_ns", row.has_responses() ? Json(row.max) : Json()}};
-}
-
-Json side_json(const DiffSide &side) {
-  const trace::RunInfo &first = side.jobs.runs().front();
-  Json seeds = Json::array();
-  for (const trace::RunInfo &run : side.jobs.runs()) seeds.push_back(run.seed);
-  return Json{{"name", side.name},
-              {"executor", first.executor},
-              {"preemption", first.preemption},
-              {"workers", trace::worker_count(first)},
-              {"driver", trace::to_string(first.driver)},
-              {"runs", side.jobs.runs().size()},
-              {"duration_ns", first.end - first.start},
-              {"seeds", seeds}};
-}
-
 }  // namespace
 
 std::vector<std::string> caveats(const DiffSide &a, const DiffSide &b) {
@@ -223,41 +190,6 @@ std::string describe(const Diffed &diffed, const StreamTraits &terminal, bool al
     text += tinted("caution: ", Tint::Caution, terminal.colour) + caution + "\n";
   }
   return text;
-}
-
-Json to_json(const Diffed &diffed) {
-  Json changes = Json::array();
-  for (const lab::Change &change : diffed.changes) {
-    changes.push_back(Json{{"kind", change.kind == lab::Change::Kind::Demand ? "demand" : "setting"},
-                           {"what", change.what},
-                           {"a", change.before},
-                           {"b", change.after}});
-  }
-  Json rows = Json::array();
-  for (const DifferenceRow &row : diffed.difference.rows) {
-    Json figures = Json::object();
-    for (std::size_t f = 0; f < kFigures.size(); ++f) {
-      figures[f == kMissed ? "miss_ratio_with_lost" : std::string(kFigures[f]) + "_ns"] = figure_json(row, f);
-    }
-    rows.push_back(Json{{"dag", row.a->dag.empty() ? Json() : Json(row.a->dag)},
-                        {"task", row.a->task.empty() ? Json() : Json(row.a->task)},
-                        {"a", counts_json(*row.a)},
-                        {"b", counts_json(*row.b)},
-                        {"figures", figures}});
-  }
-  return Json{{"format", "redag.difference/3"},
-              {"a", side_json(diffed.a)},
-              {"b", side_json(diffed.b)},
-              {"changes", changes},
-              {"worse", diffed.difference.is_any(Verdict::Worse)},
-              {"better", diffed.difference.is_any(Verdict::Better)},
-              {"tolerance", diffed.tolerance},
-              {"samples", diffed.difference.of_runs ? "runs" : "stretches"},
-              {"tests", diffed.difference.tests},
-              {"p_threshold", diffed.difference.threshold},
-              {"rows", rows},
-              {"only_one_side", diffed.difference.missing},
-              {"cautions", cautions(diffed)}};
 }
 
 }  // namespace redag::cli

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "redag_lab/cli/terminal/console.hpp"
-#include "redag_lab/cli/terminal/json.hpp"
 #include "redag_lab/run/difference.hpp"
 #include "redag_lab/workload/changes.hpp"
 
@@ -35,8 +34,5 @@ struct Diffed {
 
 /// `all`: a row for every task, not only for those with a difference.
 [[nodiscard]] std::string describe(const Diffed &diffed, const StreamTraits &terminal, bool all);
-
-/// Returns `redag.difference/3`.
-[[nodiscard]] Json to_json(const Diffed &diffed);
 
 }  // namespace redag::cli
