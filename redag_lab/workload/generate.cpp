@@ -26,14 +26,6 @@ struct Share {
   int weight;
 };
 
-// Periods with their percentage of the runnables, from S. Kramer, D. Ziegenbein, A. Hamann, "Real world automotive
-// benchmarks for free", WATERS 2015. The 15 % that follow the crankshaft have no period and are left out.
-constexpr std::array kAutomotive = {
-    Share{1 * kMillisecond, 3},    Share{2 * kMillisecond, 2},   Share{5 * kMillisecond, 2},
-    Share{10 * kMillisecond, 25},  Share{20 * kMillisecond, 25}, Share{50 * kMillisecond, 3},
-    Share{100 * kMillisecond, 20}, Share{200 * kMillisecond, 1}, Share{1000 * kMillisecond, 4},
-};
-
 // Rates at which ROS nodes commonly publish and their timers run. The weights are our choice, not a measurement.
 constexpr std::array kRobot = {
     Share{kSecond / 1000, 2}, Share{kSecond / 500, 3}, Share{kSecond / 200, 8}, Share{kSecond / 100, 15},
@@ -41,15 +33,15 @@ constexpr std::array kRobot = {
     Share{kSecond / 5, 5},    Share{kSecond, 5},
 };
 
-Duration pick(std::span<const Share> shares, Rng &rng) {
+Duration draw_robot_period(Rng &rng) {
   const int total =
-      std::accumulate(shares.begin(), shares.end(), 0, [](int n, const Share &s) { return n + s.weight; });
+      std::accumulate(kRobot.begin(), kRobot.end(), 0, [](int n, const Share &s) { return n + s.weight; });
   std::int64_t drawn = rng.uniform(0, total - 1);
-  for (const Share &share : shares) {
+  for (const Share &share : kRobot) {
     drawn -= share.weight;
     if (drawn < 0) return share.period;
   }
-  return shares.back().period;
+  return kRobot.back().period;
 }
 
 double uniform(double low, double high, Rng &rng) { return low + (high - low) * rng.uniform01(); }
@@ -173,8 +165,7 @@ class Generator {
 
   Duration draw_period(Rng &rng) const {
     switch (o_.periods) {
-      case PeriodModel::Automotive: return pick(kAutomotive, rng);
-      case PeriodModel::Robot: return pick(kRobot, rng);
+      case PeriodModel::Robot: return draw_robot_period(rng);
       case PeriodModel::Harmonic: {
         std::int64_t doublings = 0;
         while ((o_.period_min << (doublings + 1)) <= o_.period_max) ++doublings;
@@ -304,7 +295,6 @@ const char *to_string(PeriodModel value) {
   switch (value) {
     case PeriodModel::LogUniform: return "log_uniform";
     case PeriodModel::Harmonic: return "harmonic";
-    case PeriodModel::Automotive: return "automotive";
     case PeriodModel::Robot: return "robot";
   }
   return "?";

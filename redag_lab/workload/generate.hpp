@@ -16,7 +16,6 @@ namespace redag::lab {
 enum class PeriodModel : std::uint8_t {
   LogUniform,  // [period_min, period_max], multiples of period_granularity (Emberson, Stafford, Davis, WATERS 2010)
   Harmonic,    // period_min * 2^k up to period_max, equally likely
-  Automotive,  // 1 to 1000 ms, shares of Kramer, Ziegenbein, Hamann, WATERS 2015, without angle-synchronous ones
   Robot,       // 1 to 1000 Hz, the rates common in ROS; the shares are our choice
 };
 
@@ -33,8 +32,7 @@ enum class RateScope : std::uint8_t {
   PerTask,  // each timer task draws its own
 };
 
-inline constexpr std::array kPeriodModels = {PeriodModel::LogUniform, PeriodModel::Harmonic, PeriodModel::Automotive,
-                                             PeriodModel::Robot};
+inline constexpr std::array kPeriodModels = {PeriodModel::LogUniform, PeriodModel::Harmonic, PeriodModel::Robot};
 inline constexpr std::array kDagShapes = {DagShape::Layered, DagShape::ErdosRenyi, DagShape::ForkJoin, DagShape::Chain,
                                           DagShape::Independent};
 

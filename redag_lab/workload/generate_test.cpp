@@ -27,8 +27,7 @@ GenerateOptions arbitrary_options() {
   o.max_task_utilization = *rc::gen::element(0.3, 0.7, 1.0);
   const double most = o.max_task_utilization * o.dags * o.min_tasks;
   o.utilization = most * (*rc::gen::inRange(1, 101)) / 100.0;
-  o.periods =
-      *rc::gen::element(PeriodModel::LogUniform, PeriodModel::Harmonic, PeriodModel::Automotive, PeriodModel::Robot);
+  o.periods = *rc::gen::element(PeriodModel::LogUniform, PeriodModel::Harmonic, PeriodModel::Robot);
   o.shape = *rc::gen::element(DagShape::Layered, DagShape::ErdosRenyi, DagShape::ForkJoin, DagShape::Chain,
                               DagShape::Independent);
   o.rates = *rc::gen::element(RateScope::PerDag, RateScope::PerTask);
@@ -93,13 +92,11 @@ std::map<Duration, int> period_counts(PeriodModel model) {
   return counts;
 }
 
-TEST(Generate, AutomotivePeriodsHaveTheirShares) {
-  auto counts = period_counts(PeriodModel::Automotive);
-  EXPECT_EQ(counts.size(), 9U);
-  EXPECT_NEAR(counts[10 * kMillisecond], 2000.0 * 25 / 85, 75);
-  EXPECT_NEAR(counts[20 * kMillisecond], 2000.0 * 25 / 85, 75);
-  EXPECT_NEAR(counts[100 * kMillisecond], 2000.0 * 20 / 85, 75);
-  EXPECT_NEAR(counts[1000 * kMillisecond], 2000.0 * 4 / 85, 40);
+TEST(Generate, PeriodsOfRobotsHaveTheirShares) {
+  auto counts = period_counts(PeriodModel::Robot);
+  EXPECT_EQ(counts.size(), 10U);
+  EXPECT_NEAR(counts[20 * kMillisecond], 2000.0 * 20 / 100, 75);
+  EXPECT_NEAR(counts[kSecond], 2000.0 * 5 / 100, 40);
 }
 
 TEST(Generate, HarmonicPeriodsDivideEachOther) {
@@ -164,7 +161,7 @@ std::set<std::string> names_of(const std::array<Enum, N> &values) {
 }
 
 TEST(GenerateNames, AreThoseOfTheCommandLine) {
-  EXPECT_EQ(names_of(kPeriodModels), (std::set<std::string>{"log_uniform", "harmonic", "automotive", "robot"}));
+  EXPECT_EQ(names_of(kPeriodModels), (std::set<std::string>{"log_uniform", "harmonic", "robot"}));
   EXPECT_EQ(names_of(kDagShapes),
             (std::set<std::string>{"layered", "erdos_renyi", "fork_join", "chain", "independent"}));
 }
