@@ -14,7 +14,6 @@
 #include <utility>
 #include <vector>
 
-#include "redag/base/rng.hpp"
 #include "redag_lab/search/score.hpp"
 
 namespace redag::lab {
@@ -37,12 +36,6 @@ struct SearchSpace {
   }
 };
 
-struct SearchEffort {
-  std::uint64_t exhaustive = 1024;  // spaces of at most this many points are tried completely
-  std::uint32_t restarts = 8;       // random starts, besides those of the space
-  std::uint64_t seed = 1;
-};
-
 class CoordinateSearch {
  public:
   /// Returns the scores of the points, in their order. Fewer scores than points end the search.
@@ -59,17 +52,18 @@ class CoordinateSearch {
 
   CoordinateSearch(Evaluate evaluate, Better better) : evaluate_(std::move(evaluate)), better_(std::move(better)) {}
 
-  /// Runs the search. Requires a start. If it is stopped before the start is scored, there are no trials.
-  Found run(const SearchSpace &space, const SearchEffort &effort) {
+  /// Runs the search; a space of at most `exhaustive` points is tried completely. Requires a start. If it is stopped
+  /// before the start is scored, there are no trials.
+  Found run(const SearchSpace &space, std::uint64_t exhaustive) {
     found_ = {};
     found_.best = space.starts.front();
     try_points({space.starts.front()});
     if (found_.stopped) return std::move(found_);
-    if (space.size(effort.exhaustive) <= effort.exhaustive) {
+    if (space.size(exhaustive) <= exhaustive) {
       try_all(space);
     } else {
       found_.exhaustive = false;
-      for (Point &start : starts_of(space, effort)) climb(space, std::move(start));
+      for (const Point &start : space.starts) climb(space, start);
     }
     return std::move(found_);
   }
@@ -111,20 +105,6 @@ class CoordinateSearch {
       try_points(batch);
       batch.clear();
     }
-  }
-
-  static std::vector<Point> starts_of(const SearchSpace &space, const SearchEffort &effort) {
-    std::vector<Point> starts = space.starts;
-    Rng rng(effort.seed);
-    for (std::uint32_t i = 0; i < effort.restarts; ++i) {
-      Point point;
-      for (const auto &choices : space.values) {
-        point.push_back(
-            choices[static_cast<std::size_t>(rng.uniform(0, static_cast<std::int64_t>(choices.size()) - 1))]);
-      }
-      starts.push_back(std::move(point));
-    }
-    return starts;
   }
 
   void climb(const SearchSpace &space, Point here) {

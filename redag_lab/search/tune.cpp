@@ -36,7 +36,7 @@ class Tuner {
   std::optional<Tuned> run() {
     const auto better = [this](const Score &a, const Score &b) { return is_better(a, b, options_.judge); };
     CoordinateSearch search([this](std::span<const Point> points) { return scores_of(points); }, better);
-    auto found = search.run(settings_.space(), options_.effort);
+    auto found = search.run(settings_.space(), options_.exhaustive);
     if (found.trials.empty()) return std::nullopt;
 
     Tuned tuned;

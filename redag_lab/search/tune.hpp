@@ -28,7 +28,7 @@ struct TuneOptions {
   std::optional<Overheads> machine;  // charged to the bounds instead of the simulated overheads
   std::uint32_t seeds = 5;           // simulated for each setting: seed, seed + 1, ...
   std::uint32_t held_out = 10;       // the number of unseen seeds after these, for the verdict
-  SearchEffort effort = {1024, 4, 1};
+  std::uint64_t exhaustive = 1024;   // spaces of at most this many settings are tried completely
   std::uint64_t seed = 1;
   std::uint32_t jobs = 0;                             // processors; 0: all
   const std::atomic<bool> *stop = nullptr;            // ends the search with the best so far

@@ -84,7 +84,7 @@ TEST(Tune, NeverReturnsWorseThanItWasGiven) {
   for (std::uint64_t i = 0; i < 120; ++i) {
     const Workload workload = random_workload(i);
     TuneOptions options = quick();
-    options.effort.exhaustive = i % 4 == 0 ? 0 : 1024;
+    options.exhaustive = i % 4 == 0 ? 0 : 1024;
     options.freedom.priorities = true;
     const auto tuned = tune(workload, options);
     ASSERT_TRUE(tuned);
@@ -133,7 +133,7 @@ TEST(Tune, LocalSearchIsNeverBelowItsStartsAndMostlyFindsTheBest) {
     TuneOptions options = quick();
     options.held_out = 0;
     const auto exact = tune(workload, options);
-    options.effort.exhaustive = 0;
+    options.exhaustive = 0;
     const auto local = tune(workload, options);
     EXPECT_FALSE(local->exhaustive);
     EXPECT_FALSE(improves(local->best.score, exact->best.score, options.judge));
@@ -207,7 +207,7 @@ TEST(Tune, StoppedLaterGivesTheBestSoFar) {
   std::atomic<bool> stop{false};
   TuneOptions options = quick();
   options.stop = &stop;
-  options.effort.exhaustive = 0;
+  options.exhaustive = 0;
   options.progress = [&stop](std::uint64_t tried) { stop = tried > 1; };
   const auto tuned = tune(random_workload(1), options);
   ASSERT_TRUE(tuned);

@@ -87,7 +87,6 @@ int tune_file(const TuneOptions &options, Console &console) {
   tuning.options = options.tune;
   const bool by_bounds = options.tune.judge == lab::Judge::Bounds;
   if (by_bounds) tuning.options.held_out = 0;
-  tuning.options.effort.seed = options.run.seed;
   tuning.options.seed = options.run.seed;
   if (options.run.seed + options.tune.seeds + options.tune.held_out < options.run.seed) {
     console.error("--seed, --seeds and --held-out: the last seed is not below 2^64", "choose a smaller first seed");
@@ -171,7 +170,7 @@ Action add_tune(CLI::App &app) {
   add_count(app, "--seeds", tune.seeds, {1, kMostSeeds}, "Simulations of each setting, with seeds SEED, SEED+1, ...");
   add_count(app, "--held-out", tune.held_out, {0, kMostSeeds},
             "Number of unseen seeds for the validation of the result");
-  add_seed(app, options->run.seed, "First seed, also of the local search");
+  add_seed(app, options->run.seed, "First seed");
   add_count(app, "--jobs", tune.jobs, {0, kMaxJobs}, "Processors to use; 0: all. The result does not depend on it");
   app.add_flag("--all-trials", options->all_trials, "Show every setting that was tried");
   app.add_flag("--json", options->run.json, "Write one JSON document, and nothing else, to standard output");

@@ -194,10 +194,7 @@ std::string in_words(const Tuning &tuning) {
     text += fmt::format("nothing to change: no other setting that was tried {}\n",
                         tuning.options.judge == Judge::Bounds ? "has better bounds" : "misses fewer deadlines");
   }
-  if (!tuned.exhaustive) {
-    text +=
-        fmt::format("found by local search (seed {}), not all combinations were tried\n", tuning.options.effort.seed);
-  }
+  if (!tuned.exhaustive) text += "found by local search, not all combinations were tried\n";
   if (tuned.stopped) text += fmt::format("stopped after {} settings\n", format_count(tuned.trials.size()));
   return text;
 }
