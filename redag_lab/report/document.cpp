@@ -256,15 +256,13 @@ Json contender(const Group &group, DagId dag) {
 }
 
 Json comparison(std::span<const Group> groups) {
-  Json words = Json::array();
-  for (const Sentence &sentence : compare(groups)) words.push_back(to_json(sentence));
   Json rows = Json::array();
   for (const CommonDag &dag : common_dags(groups)) {
     Json row{{"name", dag.name}, {"groups", Json::array()}};
     for (std::size_t g = 0; g < groups.size(); ++g) row["groups"].push_back(contender(groups[g], dag.ids[g]));
     rows.push_back(std::move(row));
   }
-  return Json{{"words", std::move(words)}, {"dags", std::move(rows)}};
+  return Json{{"dags", std::move(rows)}};
 }
 
 // Returns the names of the workloads.

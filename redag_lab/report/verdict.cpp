@@ -123,10 +123,6 @@ void add_noticed(const Group &group, std::vector<Sentence> &sentences) {
   add_bad(noticed, sentences);
 }
 
-Contender contender_of(const Group &group, const metrics::JobCounts &jobs, std::optional<DagId> dag) {
-  return {.name = group.label, .missed = jobs.missed(), .released = jobs.released, .misses = misses_of(group, dag)};
-}
-
 void add_remarks(const Group &group, std::vector<Sentence> &sentences) {
   if (!group.is_simulated()) add_assumptions(group, sentences);
   std::uint64_t violations = 0;
@@ -257,7 +253,10 @@ Sentence headline_of(std::span<const Group> groups) {
   std::vector<std::string> shares;
   for (const Group &group : groups) {
     const metrics::JobCounts &total = group.total;
-    contenders.push_back(contender_of(group, total, std::nullopt));
+    contenders.push_back({.name = group.label,
+                          .missed = total.missed(),
+                          .released = total.released,
+                          .misses = misses_of(group, std::nullopt)});
     const std::string share = total.missed() == 0 ? "none" : format_percent(total.miss_ratio_with_lost());
     shares.push_back(shares.empty() ? fmt::format("{} missed {} of its deadlines", group.label, share)
                                     : fmt::format("{} {}", group.label, share));
@@ -269,18 +268,6 @@ Sentence headline_of(std::span<const Group> groups) {
   const std::string order = ranking(contenders);
   const bool is_plain = order.ends_with(" misses fewest");  // the shares say so
   return {Tone::Plain, join(shares) + (is_plain ? "" : ": " + order)};
-}
-
-std::vector<Sentence> compare(std::span<const Group> groups) {
-  std::vector<Sentence> sentences;
-  for (const CommonDag &dag : common_dags(groups)) {
-    std::vector<Contender> contenders;
-    for (std::size_t g = 0; g < groups.size(); ++g) {
-      contenders.push_back(contender_of(groups[g], groups[g].dags[dag.ids[g].value].jobs, dag.ids[g]));
-    }
-    sentences.push_back({Tone::Plain, comparison_line(dag.name, contenders) + "."});
-  }
-  return sentences;
 }
 
 }  // namespace redag::report

@@ -72,7 +72,4 @@ struct Contender {
 /// repetitions together.
 [[nodiscard]] std::string comparison_line(const std::string &dag, std::span<const Contender> contenders);
 
-/// Returns a sentence for each common DAG.
-[[nodiscard]] std::vector<Sentence> compare(std::span<const Group> groups);
-
 }  // namespace redag::report

@@ -7,7 +7,7 @@ import path from 'node:path';
 import {pathToFileURL} from 'node:url';
 import {chromium} from 'playwright-core';
 
-export const FIGURES = {comparison: ['missed', 'p99', 'responses', 'schedule']};
+export const FIGURES = {comparison: ['missed', 'responses', 'schedule']};
 FIGURES.experiment = ['curves'];
 FIGURES.worlds = ['curves', 'worlds'];
 FIGURES.executors = ['worlds'];

@@ -151,7 +151,7 @@ function worldsFigure() {
       const spread = (name, world) => {
         const executor = executors.find((one) => plainName(one) === name && worldOf.get(one) === world);
         const [at, min, max] = (executor && spreadAt(executor, metric)) || [null, null, null];
-        return {at, min, max, limit: null};
+        return {at, min, max};
       };
       const names = plainNames.filter((name) => worlds.some((world) => spread(name, world).at !== null));
       const series = worlds.map((world) => ({name: WORLDS[world], values: names.map((name) => spread(name, world))}));

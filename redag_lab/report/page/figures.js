@@ -74,8 +74,8 @@ function responseFigure(groups, state) {
         },
         dataZoom: [{type: 'inside', filterMode: 'none', zoomOnMouseWheel: 'ctrl', preventDefaultMouseMove: false}],
         xAxis: {
-          type: state.log ? 'log' : 'value', name: one ? 'response' : 'response / deadline', nameLocation: 'middle', nameGap: 32,
-          min: state.log ? undefined : 0, max: state.log ? undefined : Math.max(most, edge) * 1.03,
+          type: 'value', name: one ? 'response' : 'response / deadline', nameLocation: 'middle', nameGap: 32,
+          min: 0, max: Math.max(most, edge) * 1.03,
           splitNumber: width < 500 ? 3 : 6,
           axisLabel: {showMaxLabel: false, formatter: (value) => (one ? formatAxisTime(value, most / 20) : String(Number(value.toPrecision(3))))},
         },
@@ -103,7 +103,7 @@ const placeInDag = ({group, i}) => i - group.tasks.findIndex((task) => task.dag 
 /**
  * Draws a number of several things, in several series: as bars, or on a logarithmic axis, which has no zero, as dots.
  * `data()` returns {names, series, title, log, format, formatAxis, none}. A series has a name and, for each thing, {at,
- * min, max, limit}; numbers can be null. `none` is said where no number is known.
+ * min, max}; numbers can be null. `none` is said where no number is known.
  */
 function comparisonFigure({name, label, caption, data}) {
   const bars = {barGap: '12%', barMaxWidth: 46};
@@ -113,7 +113,7 @@ function comparisonFigure({name, label, caption, data}) {
       const {names, series, title, log, format, formatAxis, none} = data();
       const all = series.flatMap(({values}) => values);
       if (all.every(({at}) => at === null)) return none;
-      const positive = all.flatMap(({at, limit}) => [at, limit]).filter((number) => number > 0);
+      const positive = all.map(({at}) => at).filter((number) => number > 0);
       const floor = log ? 10 ** Math.floor(Math.log10(Math.min(...positive) / 2)) : 0;
       const hasLabels = series.length * names.length * (log ? 78 : 46) <= width;
       // A line in ink, on a bar of any shade.
@@ -125,9 +125,8 @@ function comparisonFigure({name, label, caption, data}) {
           trigger: 'item',
           formatter: ({dataIndex, seriesIndex}) => {
             const one = series[seriesIndex % series.length];
-            const {at, min, max, limit} = one.values[dataIndex];
-            return tip([`${names[dataIndex]}, ${one.name}`, at === null ? none : format(at), min === max ? null : `${format(min)} to ${format(max)}`,
-              limit === null ? null : `deadline ${format(limit)}`]);
+            const {at, min, max} = one.values[dataIndex];
+            return tip([`${names[dataIndex]}, ${one.name}`, at === null ? none : format(at), min === max ? null : `${format(min)} to ${format(max)}`]);
           },
         },
         xAxis: {type: 'category', data: names, axisTick: {show: false}, axisLabel: {color: t.ink, interval: 0, rotate: names.length * 62 > width ? 35 : 0}},
@@ -140,19 +139,15 @@ function comparisonFigure({name, label, caption, data}) {
             type: 'bar', name: one.name, ...bars, itemStyle: {...fillOf(t, shadeOf(t, s)), borderRadius: [3, 3, 0, 0]}, data: one.values.map(({at}) => at),
           }))),
           ...series.map((one, s) => ({
-            // The deadline, a line from the lowest to the highest repetition, the dot, and above all of them the number.
+            // A line from the lowest to the highest repetition, the dot, and above them the number.
             type: 'custom', name: one.name, silent: !log, z: 5, color: shadeOf(t, s).color, data: one.values.map(({max}, i) => [i, max]), encode: {x: 0, y: 1},
             renderItem: (params, api) => {
-              const {at, min, max, limit} = one.values[api.value(0)];
+              const {at, min, max} = one.values[api.value(0)];
               if (at === null) return null;
               const layout = api.barLayout({count: series.length, ...bars})[s];
               const y = (number) => api.coord([0, log ? Math.max(number, floor) : number])[1];
               const x = api.coord([api.value(0), floor])[0] + layout.offsetCenter;
               const children = [];
-              if (limit !== null) {
-                const half = layout.width * 0.56;
-                children.push(...inked({x1: x - half, x2: x + half, y1: y(limit), y2: y(limit)}, {lineWidth: 1.8, lineDash: [5, 3]}));
-              }
               if (min !== max) {
                 const ends = [{x1: x, x2: x, y1: y(max), y2: y(min)}, ...[min, max].map((end) => ({x1: x - 4, x2: x + 4, y1: y(end), y2: y(end)}))];
                 children.push(...ends.flatMap((shape) => inked(shape, {lineWidth: 1.2})));

@@ -5,7 +5,7 @@
 
 const report = JSON.parse(document.getElementById('data').textContent);
 const {groups} = report;
-const state = {executor: 0, task: null, tail: false, log: false, view: 0, why: null};
+const state = {executor: 0, task: null, tail: false, view: 0, why: null};
 const several = groups.length > 1;
 const isComparable = report.comparison.dags.length > 0;
 
@@ -32,26 +32,24 @@ function header() {
   ];
 }
 
-/** Draws a figure of the executors side by side. `cell(figures)` returns its number of a DAG as {at, min, max, limit}. */
-const executorsFigure = (name, label, caption, cell, rest) => comparisonFigure({name, label, caption, data: () => ({
-  title: label, none: 'No job finished.', names: report.comparison.dags.map((dag) => dag.name),
-  series: groups.map((group, g) => ({name: group.label, values: report.comparison.dags.map((dag) => cell(dag.groups[g]))})), ...rest,
-})});
-const missedFigure = () => executorsFigure('missed', 'missed deadlines',
-  'Share of released jobs that were late, skipped or aborted, over all repetitions. Lines: from the lowest to the highest repetition.',
-  ({miss_ratio: {min, max}, missed, released}) => ({at: missed / Math.max(1, released), min, max, limit: null}),
-  {log: false, format: formatPercent, formatAxis: (share) => `${Number((100 * share).toPrecision(3))} %`});
-const p99Figure = () => executorsFigure('p99', 'p99 end to end',
-  '99th percentile of the end-to-end response time (logarithmic): median over the repetitions. Lines: from the lowest to the highest repetition. '
-    + 'Dashed: the end-to-end deadline, where the workload states one.',
-  ({p99_ns: p99, deadline_ns: limit}) => (p99 ? {at: p99.median, min: p99.min, max: p99.max, limit} : {at: null, min: null, max: null, limit}),
-  {log: true, format: (ns) => formatTime(Number(ns.toPrecision(3))), formatAxis: (ns) => formatAxisTime(ns, ns)});
+const missedFigure = () => comparisonFigure({
+  name: 'missed', label: 'missed deadlines',
+  caption: 'Share of released jobs that were late, skipped or aborted, over all repetitions. Lines: from the lowest to the highest repetition.',
+  data: () => ({
+    title: 'missed deadlines', none: 'No job finished.', names: report.comparison.dags.map((dag) => dag.name), log: false, format: formatPercent,
+    formatAxis: (share) => `${Number((100 * share).toPrecision(3))} %`,
+    series: groups.map((group, g) => ({name: group.label, values: report.comparison.dags.map((dag) => {
+      const {miss_ratio: {min, max}, missed, released} = dag.groups[g];
+      return {at: missed / Math.max(1, released), min, max};
+    })})),
+  }),
+});
 
 function comparisonSection() {
   if (!several) return [];
   const title = heading(2, 'comparison', 'Executors side by side');
   if (!isComparable) return [title, element('p', {}, 'The runs have no DAG in common.')];
-  return [title, filled(() => comparisonTable(groups, report.comparison.dags)), verdictList(report.comparison.words), p99Figure().box];
+  return [title, filled(() => comparisonTable(groups, report.comparison.dags))];
 }
 
 function taskChoice(refresh) {
@@ -105,8 +103,7 @@ function detailSections() {
     filled(() => taskTable(groups[state.executor])),
     heading(2, 'responses', 'Response times'),
     element('div.row.controls', {}, taskChoice(responses.draw),
-      choice('Curve', ['distribution', 'tail'], 0, (i) => { state.tail = i === 1; responses.draw(); }),
-      choice('Time axis', ['linear time', 'logarithmic'], 0, (i) => { state.log = i === 1; responses.draw(); })),
+      choice('Curve', ['distribution', 'tail'], 0, (i) => { state.tail = i === 1; responses.draw(); })),
     responses.box,
     ...why.nodes,
     heading(2, 'schedule', 'Schedule'),
