@@ -104,30 +104,6 @@ Table task_table(std::span<const live::Listed> pages, const LiveView &view) {
   return table;
 }
 
-Table device_table(const Frame &frame, std::size_t most) {
-  Table table({{"device", false, 9},
-               {"busy", true, 7},
-               {"slots", true, 6},
-               {"queue", true, 8},
-               {"served/s", true, 5},
-               {"serves", false, 1}});
-  for (std::size_t i = 0; i < std::min(most, frame.devices.size()); ++i) {
-    const live::DeviceFrame &device = frame.devices[i];
-    const double busy = share_of(device, frame);
-    std::string tasks = device.tasks.empty() ? "" : full_name(frame.tasks[device.tasks.front()], frame);
-    if (device.used > 1 && !tasks.empty()) tasks += fmt::format(", {} more", device.used - 1);
-    table.add({{device.name},
-               {format_percent(busy), busy >= 0.9   ? Tint::Bad
-                                      : busy >= 0.7 ? Tint::Caution
-                                                    : Tint::Plain},
-               {fmt::format("{}/{}", device.used, device.slots)},
-               count_cell(device.queued),
-               {rate_text(rate_of(device, frame))},
-               {std::move(tasks)}});
-  }
-  return table;
-}
-
 Table executor_table(const std::vector<live::Listed> &pages, Time now) {
   Table table({{"pid", true, 9},
                {"executor", false, 8},

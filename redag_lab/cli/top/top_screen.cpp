@@ -21,8 +21,6 @@ namespace {
 using live::Frame;
 using Lines = std::vector<std::string>;
 
-constexpr std::size_t kMostDevices = 4;  // on a screen
-
 // Each line fits into 80 columns.
 constexpr std::array kHelp{
     "KEYS",
@@ -41,7 +39,6 @@ constexpr std::array kHelp{
     "  away            of these, jobs that wait without a worker",
     "  ready           jobs that could start",
     "  cpu             share of one processor, of jobs that ended",
-    "  queue           jobs that wait for a slot of the device",
     "COLOURS",
     "  red             missed lately, or beyond the deadline or the bound",
     "  yellow          within a tenth of it, missed earlier, or at max_active",
@@ -51,7 +48,17 @@ constexpr std::array kHelp{
 constexpr const char *kKeys = "? help  q quit  < > sort  a all  Tab next";
 constexpr const char *kNone = "no running executor publishes a live page; waiting for one";
 
-/// Returns the lines above the tables of an executor.
+/// Returns "gpu 80.4 % busy, 2 jobs queued", of all devices.
+std::string devices_in_words(const Frame &frame) {
+  std::string text;
+  for (const live::DeviceFrame &device : frame.devices) {
+    text += fmt::format("{}{} {} busy, {} queued", text.empty() ? "" : "; ", device.name,
+                        format_percent(share_of(device, frame)), plural(device.queued, "job"));
+  }
+  return text;
+}
+
+/// Returns the lines above the table of an executor.
 Lines head_of(const live::Listed &listed, Time now, bool colour) {
   const Frame &frame = listed.page->frame;
   const live::page::Figures total = total_of(frame);
@@ -69,6 +76,7 @@ Lines head_of(const live::Listed &listed, Time now, bool colour) {
   lines.push_back(tinted(misses_in_words(total, frame.window), misses, colour));
   if (total.away > 0 || !frame.devices.empty()) lines.back() += fmt::format("  {} away", plural(total.away, "job"));
   if (const std::string hint = hint_on_misses(frame); !hint.empty()) lines.back() += "  " + hint;
+  if (!frame.devices.empty()) lines.push_back(devices_in_words(frame));
   if (!frame.alert.empty()) lines.push_back(tinted(frame.alert, Tint::Bad, colour));
   if (const auto late = overdue(frame, now)) {
     lines.push_back(
@@ -80,14 +88,6 @@ Lines head_of(const live::Listed &listed, Time now, bool colour) {
                            Tint::Caution, colour));
   }
   return lines;
-}
-
-/// Adds at most `most` devices to `lines`.
-void add_devices(const Frame &frame, std::size_t most, std::size_t width, bool colour, Lines &lines) {
-  if (frame.devices.empty()) return;
-  for (std::string &line : device_table(frame, most).lines(width, colour)) lines.push_back(std::move(line));
-  const std::size_t shown = std::min(most, frame.devices.size());
-  if (frame.devices_in_all > shown) lines.push_back(fmt::format("{} more devices", frame.devices_in_all - shown));
 }
 
 /// The parts of a screen. Of the body, what fits below the head is seen.
@@ -119,7 +119,6 @@ class Drawing {
         parts.head.push_back(
             tinted(fmt::format("the executor has ended; waiting for the next '{}'", frame.name), Tint::Bad, colour_));
       }
-      add_devices(frame, kMostDevices, columns_, colour_, parts.head);
     }
     parts.head.push_back(status());
     const auto pages = state_.view.all ? std::span(input_.pages) : std::span(input_.shown, 1);
@@ -170,10 +169,8 @@ std::vector<std::string> draw_top(TopState &state, const TopInput &input, std::s
 }
 
 std::string draw_once(const live::Listed &listed, const LiveView &view, Time now, std::size_t width, bool colour) {
-  Lines lines = head_of(listed, now, colour);
-  add_devices(listed.page->frame, listed.page->frame.devices.size(), width, colour, lines);
   std::string text;
-  for (const std::string &line : lines) text += (width > 0 ? cut(line, width) : line) + "\n";
+  for (const std::string &line : head_of(listed, now, colour)) text += (width > 0 ? cut(line, width) : line) + "\n";
   return text + task_table(std::span(&listed, 1), view).render(width, colour);
 }
 

@@ -17,7 +17,6 @@
 namespace redag::cli {
 namespace {
 
-using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::SizeIs;
@@ -161,15 +160,6 @@ TEST(TopScreen, HelpAt80x24) {
   TopState state;
   state.mode = TopMode::Help;
   expect_screen("help_80x24", shoot(state, nullptr, 80, 24));
-}
-
-TEST(TopScreen, OfTooManyDevicesSomeAreCounted) {
-  live::Listed robot = accelerated_page();
-  live::Frame &frame = robot.page->frame;
-  while (frame.devices.size() < live::page::kDevices) frame.devices.push_back({.name = "npu"});
-  frame.devices_in_all = 20;
-  EXPECT_THAT(shoot(&robot, 80, 24), Contains("16 more devices"));
-  EXPECT_THAT(draw_once(robot, {}, frame.published, 80, false), HasSubstr("\n8 more devices\n"));
 }
 
 TEST(TopScreen, OfAllExecutorsNamesThem) {

@@ -18,8 +18,7 @@ const alarm = element('p.missed', {role: 'alert'});
 const picker = element('select', {'aria-label': 'executor', onchange: () => choose(picker.value)});
 const pick = element('label', {}, 'executor', picker);
 const workers = element('div.workers');
-const devices = table('Devices', DEVICE_COLUMNS, []);
-const deviceSection = element('div', {}, element('h2', {id: 'devices'}, 'Devices'), devices);
+const devices = element('p', {id: 'devices'});
 const rows = table('DAGs and tasks', LIVE_COLUMNS, [], {most: 200});  // a browser is slow with more
 const content = element('div');
 
@@ -65,11 +64,9 @@ function show() {
   say(misses, `${verdict} \u2013 ${formatCount(total.finished)} finished, ${Number(total.rate.toPrecision(4))}/s${frame.on_misses ? ` \u2013 ${frame.on_misses}` : ''}`,
     total.lately > 0 ? 'missed' : total.missed > 0 ? 'delay' : 'met');
   say(alarm, [frame.alert, problem.startsWith('no update') ? 'The process is stopped, or gets no processor.' : null,
-    frame.left_out > 0 ? `${formatCount(frame.left_out)} more tasks do not fit the live page.` : null,
-    frame.devices_in_all > frame.devices.length ? `${formatCount(frame.devices_in_all - frame.devices.length)} more devices do not fit the live page.` : null].filter(Boolean).join(' '));
+    frame.left_out > 0 ? `${formatCount(frame.left_out)} more tasks do not fit the live page.` : null].filter(Boolean).join(' '));
   patch(workers, workerBars(frame));
-  deviceSection.hidden = frame.devices.length === 0;
-  devices.update(deviceRows(frame));
+  say(devices, devicesInWords(frame));
   rows.update(liveRows(frame, view));
 }
 
@@ -104,7 +101,7 @@ function choose(executor) {
 
 const filter = element('input', {type: 'search', placeholder: 'filter names', 'aria-label': 'filter names', oninput: () => { view.filter = filter.value; if (live.frame) show(); }});
 const ROWS = ['all', 'DAGs', 'tasks'];
-content.append(misses, alarm, workers, deviceSection, element('h2', {id: 'table'}, 'DAGs and tasks'),
+content.append(misses, alarm, workers, devices, element('h2', {id: 'table'}, 'DAGs and tasks'),
   element('div.row.controls', {}, filter, choice('Response times', ['of the last seconds', 'since the start'], 0, (i) => { view.whole = i === 1; show(); }),
     choice('Rows', ROWS, 0, (i) => { view.rows = ROWS[i]; show(); })),
   rows);

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What the page of `redag serve` shows of a frame: bars of workers, devices, and the rows of DAGs and tasks. What is
-// equal from frame to frame stays, with focus and scrolling.
+// What the page of `redag serve` shows of a frame: bars of workers, and the rows of DAGs and tasks. What is equal from
+// frame to frame stays, with focus and scrolling.
 
 const NEAR = 0.9;  // share of a limit that counts as near, as in redag top
 
@@ -25,11 +25,8 @@ const workerBars = ({threads}) => threads.filter(({cpu, task}) => cpu > 0 || tas
 
 const perSecond = (rate) => ({text: rate > 0 ? String(Number(rate.toPrecision(4))) : '\u2013', sort: rate});
 
-const DEVICE_COLUMNS = [column('device'), column('busy', 'Time of its services, as a share of its slots', 'text'), column('slots', 'Slots in use, and there are'),
-  column('queue', 'Jobs that wait for a slot'), column('served/s', 'Services that ended, per second', 'minor'), column('serves', 'The tasks of the jobs that it serves now', 'text')];
-const deviceRows = ({devices}) => devices.map(({name, busy, used, slots, queued, rate, tasks}) => ({cells: [
-  name, {text: loadBar(busy), sort: busy}, {text: `${used}/${slots}`, sort: used}, countCell(queued), perSecond(rate),
-  [...tasks, ...(used > tasks.length ? [`${used - tasks.length} more`] : [])].join(', ')]}));
+/** "gpu 80.4 % busy, 2 queued", of all devices. */
+const devicesInWords = ({devices}) => devices.map(({name, busy, queued}) => `${name} ${formatPercent(busy)} busy, ${formatCount(queued)} queued`).join(' \u00b7 ');
 
 const LIVE_COLUMNS = [
   column('DAG and task'), column('rate/s', 'Jobs that finished, per second', 'minor'), column('p50', 'Median response time; of a DAG end to end', 'minor'),
