@@ -109,7 +109,7 @@ class Combinations(Case):
         self.refuse("experiment", self.cart, "--out", self.folder / "out", "--jobs", "100000", says="--jobs: '100000' is not a whole number from 1 to 1024")
         self.refuse("compare", self.cart, "--simulate", "--repeat", "2", "--seed", str(2**64 - 1), says="last seed")
         self.refuse("tune", self.cart, "--seed", str(2**64 - 1), says="last seed")
-        self.refuse("generate", "--period-min", "1h", "--period-max", "1s", says="--period-min to --period-max")
+        self.refuse("generate", "--period-min", "1h", "--period-max", "1s", says="period_min to period_max must be a range")
 
     def test_an_executor_with_a_mode_of_its_own(self):
         for command in ("simulate", "run"):

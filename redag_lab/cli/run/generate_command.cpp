@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <memory>
 
 #include "redag/loader/validate.hpp"
@@ -66,24 +65,10 @@ std::string provenance(const CLI::App &app, std::uint64_t seed) {
   return line + fmt::format(" --seed {}\n", seed);
 }
 
-// Replaces the names of lab::GenerateOptions in a message by options: "period_min" by --period-min.
-std::string in_options(const CLI::App &app, const std::string &message) {
-  std::string text;
-  for (std::size_t at = 0; at < message.size();) {
-    const std::size_t end = std::min(message.find(' ', at), message.size());
-    std::string name = "--" + message.substr(at, end - at);
-    std::replace(name.begin(), name.end(), '_', '-');
-    text += app.get_option_no_throw(name) != nullptr ? name : message.substr(at, end - at);
-    if (end < message.size()) text += ' ';
-    at = end + 1;
-  }
-  return text;
-}
-
 int generate_workload(const CLI::App &app, const GenerateOptions &options, Console &console) {
   const Result<Workload> workload = generate(options.generate, options.seed);
   if (!workload) {
-    for (const Diagnostic &mistake : workload.error()) console.error(in_options(app, mistake.message), mistake.hint);
+    console.note(workload.error());
     return kExitBad;
   }
   const std::string text = provenance(app, options.seed) + to_yaml(*workload);
