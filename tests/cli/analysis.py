@@ -83,7 +83,7 @@ class Clusters(Case):
                                      "redag.summary/2")
             self.assertTrue(document["check"]["ok"])
         compared = redag("compare", self.clusters, "--simulate", "--executors", "redag,mte,ste", "--duration", "1s", "--json")
-        self.assertEqual(len(self.document(compared, "redag.comparison/2")["executors"]), 3)
+        self.assertEqual(len(self.document(compared, "redag.comparison/3")["executors"]), 3)
 
     def test_commands_that_refuse(self):
         self.expect(redag("simulate", self.clusters, "--workers", "2"), 2, "--workers: the platform has clusters")

@@ -260,7 +260,7 @@ class Waits(Case):
 
     def test_compared(self):
         result = redag("compare", self.FILE, "--simulate", "--executors", "redag,redag-none", "--duration", "2s", "--json")
-        of = {each["name"]: each for each in self.document(result, "redag.comparison/2")["executors"]}
+        of = {each["name"]: each for each in self.document(result, "redag.comparison/3")["executors"]}
         self.assertEqual(set(of), {"redag", "redag-none"})
         result = redag("compare", self.FILE, "--executors", "redag-none,redag-cooperative", "--duration", "500ms",
                        "--repeat", "1")
@@ -440,7 +440,7 @@ class Compare(Case):
     def test_simulated(self):
         out = self.folder / "out"
         result = redag("compare", self.cart, "--simulate", "--duration", "2s", "--repeat", "2", "--json", "--out", out)
-        document = self.document(result, "redag.comparison/2")
+        document = self.document(result, "redag.comparison/3")
         self.assertEqual([executor["name"] for executor in document["executors"]], ["redag", "mte", "ste"])
         for executor in document["executors"]:
             self.assertEqual(executor["repetitions"], 2)

@@ -174,7 +174,7 @@ class Comparing {
         all_written_ = false;
       }
       const std::string words =
-          fmt::format("\n{0}/comparison.json: every repetition; 'redag report {0}' makes a page\n", folder);
+          fmt::format("\nwrote {0}/: comparison.json, and the files of each run; 'redag report {0}' makes a page\n", folder);
       options_.run.json ? console_.note(words) : console_.say(words);
     }
     if (!all_written_) return kExitBad;

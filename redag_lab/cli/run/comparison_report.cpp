@@ -25,24 +25,9 @@ Json spread_json(const lab::Spread &spread) {
   return Json{{"median", spread.median}, {"min", spread.min}, {"max", spread.max}};
 }
 
-Json distribution_json(const metrics::Distribution &d) {
-  return Json{{"count", d.count}, {"mean_ns", d.mean}, {"min_ns", d.min}, {"p50_ns", d.p50},
-              {"p90_ns", d.p90},  {"p95_ns", d.p95},   {"p99_ns", d.p99}, {"max_ns", d.max}};
-}
-
 Json counts_json(const metrics::JobCounts &jobs) {
   return Json{{"released", jobs.released}, {"finished", jobs.finished}, {"late", jobs.late},
               {"skipped", jobs.skipped},   {"aborted", jobs.aborted},   {"missed", jobs.missed()}};
-}
-
-Json dag_json(const metrics::DagSummary &seen, bool is_dag) {
-  Json json = counts_json(seen.jobs);
-  json["miss_ratio"] = seen.jobs.miss_ratio();
-  json["miss_ratio_with_lost"] = seen.jobs.miss_ratio_with_lost();
-  if (!is_dag) return json;
-  json["end_to_end_late"] = seen.end_to_end.late;
-  json["end_to_end"] = distribution_json(seen.end_to_end.response);
-  return json;
 }
 
 Json optional_spread(const std::optional<lab::Spread> &spread) { return spread ? spread_json(*spread) : Json(); }
@@ -60,8 +45,6 @@ Json row_json(const lab::ExecutorResults &results, const std::string &name, std:
     const std::optional<Duration> longest = results.longest_end_to_end(dag);
     json["end_to_end_max_ns"] = longest ? Json(*longest) : Json();
   }
-  json["repetitions"] = Json::array();
-  for (const auto &repetition : results.repetitions) json["repetitions"].push_back(dag_json(repetition[dag], is_dag));
   return json;
 }
 
@@ -192,7 +175,7 @@ Json to_json(const lab::Comparison &comparison) {
                              {"dags", dags},
                              {"total", row_json(results, "total", total, false)}});
   }
-  return Json{{"format", "redag.comparison/2"},
+  return Json{{"format", "redag.comparison/3"},
               {"workload", comparison.workload},
               {"driver", trace::to_string(comparison.driver)},
               {"workers", comparison.workers},

@@ -55,7 +55,7 @@ std::vector<std::string> labels_of(const std::vector<fs::path> &subjects) {
 }
 
 // Accepts this version and the previous one, which share the keys read here.
-bool is_comparison(const Json &format) { return format == "redag.comparison/1" || format == "redag.comparison/2"; }
+bool is_comparison(const Json &format) { return format == "redag.comparison/2" || format == "redag.comparison/3"; }
 
 // Reads from a comparison the order of its runs, and its warnings.
 Result<void> read_comparison(const fs::path &file, std::vector<std::string> &order, std::vector<std::string> &notes) {
