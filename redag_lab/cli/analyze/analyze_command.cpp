@@ -245,10 +245,7 @@ int analyze_file(const AnalyzeOptions &options, Console &console) {
   const InterruptGuard guard;
   AnalysisWatch watch(options.analysis, console);
   const Result<Parts> analysed = analyse_configured(*workload, options, watch);
-  if (!analysed) {
-    console.note(analysed.error());
-    return kExitBad;
-  }
+  if (!ok(analysed, console)) return kExitBad;
   if (!report(*analysed, options, watch, console)) return kExitBad;
   return options.analysis.run.check && !lab::is_schedulable(*analysed) ? kExitNo : kExitOk;
 }

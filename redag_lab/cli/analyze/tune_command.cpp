@@ -101,27 +101,16 @@ int tune_file(const TuneOptions &options, Console &console) {
   std::string source;
   const std::optional<Workload> workload = load_without_clusters(options.run, "tune", console, &source);
   if (!workload) return kExitBad;
-  if (!options.output.empty()) {
-    if (const Result<void> writable = check_output(options.output); !writable) {
-      console.note(writable.error());
-      return kExitBad;
-    }
-  }
+  if (!options.output.empty() && !ok(check_output(options.output), console)) return kExitBad;
   if (options.run.calibration) {
     const Result<Overheads> machine = options.run.calibration->of(is_realtime(workload->platform.preemption));
-    if (!machine) {
-      console.note(machine.error());
-      return kExitBad;
-    }
+    if (!ok(machine, console)) return kExitBad;
     tuning.options.machine = *machine;
     tuning.options.simulation.overheads = sim::overheads_of(*machine);
   }
   if (by_bounds) {
     const Result<analysis::TaskSet> task_set = analysis::compile(*workload, analysis::platform_of(*workload));
-    if (!task_set) {
-      console.note(task_set.error());
-      return kExitBad;
-    }
+    if (!ok(task_set, console)) return kExitBad;
   }
   tuning.options.simulation.duration = options.run.duration.value_or(lab::sensible_duration(*workload));
 

@@ -62,13 +62,6 @@ Result<FinishedRun> drive(const PlannedRun &planned, const std::string &program)
   return FinishedRun{std::move(session->trace), std::move(session->summary), std::move(session->check)};
 }
 
-// Prints the errors of a failed result.
-template <class T>
-bool ok(const Result<T> &result, Console &console) {
-  if (!result) console.note(result.error());
-  return result.has_value();
-}
-
 /// Runs the units of the share that the folder does not have yet.
 class Run {
  public:

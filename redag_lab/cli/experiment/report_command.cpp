@@ -46,16 +46,10 @@ class Reporting {
 
   int run() {
     Result<RecordedPlaces> found = find_recorded_runs(options_.places);
-    if (!found) {
-      console_.note(found.error());
-      return kExitBad;
-    }
+    if (!ok(found, console_)) return kExitBad;
     notes_ = std::move(found->notes);
     const bool writes = !options_.json || !options_.output.empty();
-    if (const Result<void> writable = check_output(output()); writes && !writable) {
-      console_.note(writable.error());
-      return kExitBad;
-    }
+    if (writes && !ok(check_output(output()), console_)) return kExitBad;
     const InterruptGuard guard;
     if (!read(*found)) return kExitBad;
     progress_.clear();
@@ -79,11 +73,7 @@ class Reporting {
         if (InterruptGuard::interrupted()) break;
         progress_.draw(static_cast<double>(done) / static_cast<double>(count), file);
         const Result<trace::Recording> trace = trace::Recording::open(file);
-        if (!trace) {
-          progress_.clear();
-          console_.note(trace.error());
-          return false;
-        }
+        if (!trace) return fail(trace.error());
         if (!group.fits(trace->info())) {
           progress_.clear();
           console_.error(
@@ -93,11 +83,7 @@ class Reporting {
           return false;
         }
         const Result<void> added = group.add(fs::path(file).parent_path().string(), *trace);
-        if (!added) {
-          progress_.clear();
-          console_.note(added.error());
-          return false;
-        }
+        if (!added) return fail(added.error());
         any = true;
         ++done;
       }
@@ -113,6 +99,12 @@ class Reporting {
     return true;
   }
 
+  bool fail(const Diagnostics &errors) {
+    progress_.clear();
+    console_.note(errors);
+    return false;
+  }
+
   int write() {
     report::DocumentOptions options;
     options.notes = notes_;
@@ -125,10 +117,7 @@ class Reporting {
     const std::string path = output();
     const std::string html = report::page(document);
     const Result<void> written = write_text(path, html);
-    if (!written) {
-      console_.note(written.error());
-      return kExitBad;
-    }
+    if (!ok(written, console_)) return kExitBad;
     std::string text;
     for (const report::Group &group : groups_) {
       text += (groups_.size() > 1 ? group.label + ": " : "") + report::verdict_of(group).front().text + "\n";
@@ -159,10 +148,7 @@ class Reporting {
 // Writes the page of an experiment.
 int report_experiment(const ReportArguments &options, const std::string &file, Console &console) {
   const Result<std::string> text = trace::read_file(file);
-  if (!text) {
-    console.note(text.error());
-    return kExitBad;
-  }
+  if (!ok(text, console)) return kExitBad;
   const Json document = Json::parse(*text, nullptr, false);
   if (!document.is_object() || document.value("format", "") != "redag.experiment/1") {
     console.error(fmt::format("{}: is not a redag.experiment/1 document", file),
@@ -177,10 +163,7 @@ int report_experiment(const ReportArguments &options, const std::string &file, C
   const std::string html = report::page(*text, report::PageKind::Experiment);
   const std::string path =
       options.output.empty() ? (fs::path(file).parent_path() / "report.html").string() : options.output;
-  if (const Result<void> written = write_text(path, html); !written) {
-    console.note(written.error());
-    return kExitBad;
-  }
+  if (!ok(write_text(path, html), console)) return kExitBad;
   const std::string words =
       fmt::format("{}: {} of {} {}\n{}", name, document.value("done", std::uint64_t{0}),
                   document.value("units", std::uint64_t{0}), document.value("units_are", ""), page_text(path, html));

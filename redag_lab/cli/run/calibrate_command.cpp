@@ -57,10 +57,7 @@ int calibrate(const CalibrateOptions &options, Console &console) {
   if (const auto busy = lab::busy_machine_warning()) console.warn(*busy);
   const InterruptGuard guard;  // covers writing the file too
   Result<Calibration> measured = measure(options, console);
-  if (!measured) {
-    console.note(measured.error());
-    return kExitBad;
-  }
+  if (!ok(measured, console)) return kExitBad;
   Calibration &calibration = *measured;
   const Provenance now = current_provenance();
   calibration.date = now.created;
@@ -73,10 +70,7 @@ int calibrate(const CalibrateOptions &options, Console &console) {
         "'none' use them");
   }
   console.say(describe(calibration));
-  if (const Result<void> written = write_text(options.out, to_yaml(calibration)); !written) {
-    console.note(written.error());
-    return kExitBad;
-  }
+  if (!ok(write_text(options.out, to_yaml(calibration)), console)) return kExitBad;
   console.say(fmt::format("wrote {}: charge these overheads with --overheads {}\n", options.out, options.out));
   return kExitOk;
 }

@@ -126,10 +126,7 @@ class Comparing {
   bool write(lab::Session &session, const lab::Variant &variant, std::uint32_t repetition) {
     if (options_.run.folder.empty()) return true;
     const std::string folder = fmt::format("{}/{}/repetition-{}", options_.run.folder, variant.name, repetition + 1);
-    if (const Result<void> made = prepare_folder(folder); !made) {
-      console_.note(made.error());
-      return false;
-    }
+    if (!ok(prepare_folder(folder), console_)) return false;
     const WrittenFiles written = write_session(session, {.folder = folder});
     console_.note(written.problems);
     all_written_ = all_written_ && written.problems.empty();
@@ -169,10 +166,7 @@ class Comparing {
     }
     const std::string &folder = options_.run.folder;
     if (!folder.empty()) {
-      if (const Result<void> written = write_text(folder + "/comparison.json", document); !written) {
-        console_.note(written.error());
-        all_written_ = false;
-      }
+      all_written_ = ok(write_text(folder + "/comparison.json", document), console_) && all_written_;
       const std::string words =
           fmt::format("\nwrote {0}/: comparison.json, and the files of each run; 'redag report {0}' makes a page\n", folder);
       options_.run.json ? console_.note(words) : console_.say(words);
@@ -223,10 +217,7 @@ int compare(const CompareOptions &options, const CLI::App &app, Console &console
     return kExitBad;
   }
   const Result<std::vector<lab::Variant>> variants = lab::parse_variants(options.executors);
-  if (!variants) {
-    console.note(variants.error());
-    return kExitBad;
-  }
+  if (!ok(variants, console)) return kExitBad;
   if (variants->size() < 2) {
     console.error(fmt::format("--executors: there is no other executor to compare '{}' with", variants->front().name),
                   "name two or more, such as redag,mte; 'redag run' runs a single one");
@@ -247,10 +238,7 @@ int compare(const CompareOptions &options, const CLI::App &app, Console &console
     return kExitBad;
   }
   for (const lab::Variant &variant : *variants) {
-    if (const Result<Workload> configured = lab::configure(*workload, variant); !configured) {
-      console.note(configured.error());
-      return kExitBad;
-    }
+    if (!ok(lab::configure(*workload, variant), console)) return kExitBad;
   }
   const trace::Driver driver = options.simulate ? trace::Driver::Simulator : trace::Driver::Threads;
   const Duration usual = options.simulate ? lab::sensible_duration(*workload) : kThreadsDuration;

@@ -49,10 +49,7 @@ class RecordedComparison {
   // Reads one side. Returns false after printing an error.
   bool read(const std::string &place, DiffSide &side) {
     const Result<RecordedPlaces> found = find_recorded_runs({place});
-    if (!found) {
-      console_.note(found.error());
-      return false;
-    }
+    if (!ok(found, console_)) return false;
     side.name = place;
     for (const std::string &note : found->notes) diffed_.warnings.push_back(fmt::format("{}: {}", place, note));
     std::vector<std::string> traces;

@@ -165,9 +165,9 @@ class Checking {
       }
       for (const std::string &file : *files) check(file);
     }
-    const bool ok = readable_ && lawful_;
+    const bool all_ok = readable_ && lawful_;
     if (options_.json) {
-      console_.print(to_text(Json{{"format", "redag.check-trace/1"}, {"ok", ok}, {"traces", traces_}}));
+      console_.print(to_text(Json{{"format", "redag.check-trace/1"}, {"ok", all_ok}, {"traces", traces_}}));
     }
     if (!readable_) return kExitBad;
     return lawful_ ? kExitOk : kExitNo;
@@ -239,9 +239,7 @@ Action add_events(CLI::App &app) {
       console.error("the events of one result are printed, and several are given", "--check takes several");
       return kExitBad;
     }
-    const Result<void> converted = convert(*options, console);
-    if (!converted) console.note(converted.error());
-    return converted ? kExitOk : kExitBad;
+    return ok(convert(*options, console), console) ? kExitOk : kExitBad;
   };
 }
 

@@ -67,20 +67,14 @@ std::string provenance(const CLI::App &app, std::uint64_t seed) {
 
 int generate_workload(const CLI::App &app, const GenerateOptions &options, Console &console) {
   const Result<Workload> workload = generate(options.generate, options.seed);
-  if (!workload) {
-    console.note(workload.error());
-    return kExitBad;
-  }
+  if (!ok(workload, console)) return kExitBad;
   const std::string text = provenance(app, options.seed) + to_yaml(*workload);
   if (options.file.empty()) {
     console.print(text);
     return kExitOk;
   }
   const Result<void> written = check_output(options.file).and_then([&] { return write_text(options.file, text); });
-  if (!written) {
-    console.note(written.error());
-    return kExitBad;
-  }
+  if (!ok(written, console)) return kExitBad;
   console.note(fmt::format("wrote {}\n", options.file));
   return kExitOk;
 }

@@ -110,10 +110,7 @@ void add_thread_arguments(CLI::App &app, RunArguments &arguments) {
 std::optional<Workload> load_configured(const RunArguments &arguments, Console &console, LoadOptions options,
                                         std::string *source) {
   Result<robot::Input> input = load_workload_or_robot(arguments.file, options, source);
-  if (!input) {
-    console.note(input.error());
-    return std::nullopt;
-  }
+  if (!ok(input, console)) return std::nullopt;
   console.note(input->loaded.warnings);
   Workload workload = std::move(input->loaded.workload);
   const bool is_unchanged = !arguments.policy && !arguments.ties && !arguments.preemption && arguments.workers == 0;
@@ -141,9 +138,7 @@ std::optional<Workload> load_without_clusters(const RunArguments &arguments, con
   std::optional<Workload> workload = load_configured(arguments, console, {.waits = true}, source);
   if (!workload) return std::nullopt;
   for (const Result<void> &one : {refuse_clusters(*workload, command), refuse_separate_modes(*workload, command)}) {
-    if (one) continue;
-    console.note(one.error());
-    return std::nullopt;
+    if (!ok(one, console)) return std::nullopt;
   }
   return workload;
 }
@@ -172,10 +167,7 @@ bool write_changed(const std::string &path, const std::string &source, const Wor
   const Result<void> written = write_text(
       path,
       is_unchanged ? source : provenance_to_comment(current_provenance()) + std::string(without_provenance(changed)));
-  if (!written) {
-    console.note(written.error());
-    return false;
-  }
+  if (!ok(written, console)) return false;
   console.note(fmt::format("wrote {}{}\n", path, is_unchanged ? ": the unchanged workload" : ""));
   return true;
 }
@@ -251,10 +243,7 @@ std::optional<lab::SessionOptions> session_options(const RunArguments &arguments
   if (!arguments.folder.empty()) {
     if (arguments.record) options.record = fmt::format("{}/{}", arguments.folder, trace::kEventsFile);
     options.record_bytes = std::uint64_t{arguments.record_mib} << 20U;
-    if (const Result<void> made = prepare_folder(arguments.folder); !made) {
-      console.note(made.error());
-      return std::nullopt;
-    }
+    if (!ok(prepare_folder(arguments.folder), console)) return std::nullopt;
   }
   return options;
 }

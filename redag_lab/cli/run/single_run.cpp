@@ -31,10 +31,7 @@ Result<lab::Session> run_interruptibly(const Workload &workload, const lab::Vari
 
 int run_once(const RunArguments &arguments, const std::string &executor, trace::Driver driver, Console &console) {
   const Result<lab::Variant> variant = lab::parse_variant(executor);
-  if (!variant) {
-    console.note(variant.error());
-    return kExitBad;
-  }
+  if (!ok(variant, console)) return kExitBad;
   const bool simulated = driver == trace::Driver::Simulator;
   if (simulated && variant->realtime_threads) {
     console.error(fmt::format("the simulator has no threads to make real-time: use '{}'", variant->executor));
@@ -43,10 +40,7 @@ int run_once(const RunArguments &arguments, const std::string &executor, trace::
   const std::optional<Workload> workload = load_configured(arguments, console, {.waits = variant->is_redag()});
   if (!workload) return kExitBad;
   if (!takes_arguments({*variant}, arguments, console)) return kExitBad;
-  if (const Result<Workload> configured = lab::configure(*workload, *variant); !configured) {
-    console.note(configured.error());
-    return kExitBad;
-  }
+  if (!ok(lab::configure(*workload, *variant), console)) return kExitBad;
   const Duration usual = simulated ? lab::sensible_duration(*workload) : kSingleRunDuration;
   std::optional<lab::SessionOptions> options = session_options(arguments, driver, usual, console);
   if (!options) return kExitBad;
@@ -56,10 +50,7 @@ int run_once(const RunArguments &arguments, const std::string &executor, trace::
   if (const auto busy = simulated ? std::nullopt : lab::busy_machine_warning()) console.warn(*busy);
   const InterruptGuard guard;  // covers writing the results too
   Result<lab::Session> session = run_interruptibly(*workload, *variant, *options, console);
-  if (!session) {
-    console.note(session.error());
-    return kExitBad;
-  }
+  if (!ok(session, console)) return kExitBad;
   for (const std::string &warning : session->warnings) console.warn(warning);
   if (arguments.json) {
     console.print(to_text(to_json(*session)));

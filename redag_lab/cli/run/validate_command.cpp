@@ -81,16 +81,16 @@ int validate_files(const ValidateOptions &options, Console &console) {
   for (const std::string &file : options.files) {
     const Result<robot::Input> input = load_workload_or_robot(file, {.wcet_optional = true, .waits = true});
     const Diagnostics &found = input ? input->loaded.warnings : input.error();
-    const bool ok = input.has_value() && (found.empty() || !options.strict);
-    all_ok = all_ok && ok;
+    const bool is_ok = input.has_value() && (found.empty() || !options.strict);
+    all_ok = all_ok && is_ok;
     if (options.json) {
-      files.push_back(Json{{"file", file}, {"ok", ok}, {"diagnostics", diagnostics_json(found)}});
+      files.push_back(Json{{"file", file}, {"ok", is_ok}, {"diagnostics", diagnostics_json(found)}});
       if (input && input->robot) files.back()["robot"] = input->robot->name;
       if (input) files.back()["workload"] = facts_json(input->loaded.workload.name, facts_of(input->loaded.workload));
       continue;
     }
     console.note(found);
-    if (ok) {
+    if (is_ok) {
       const std::string verdict = tinted("ok", Tint::Good, console.out_traits().colour);
       console.say(fmt::format("{}: {}: {}{}\n", file, verdict, input->robot ? describe(*input->robot) : "",
                               describe(facts_of(input->loaded.workload))));

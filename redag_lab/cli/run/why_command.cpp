@@ -39,9 +39,7 @@ class Explaining {
 
   int run() {
     const Result<int> explained = explain();
-    if (explained) return *explained;
-    console_.note(explained.error());
-    return kExitBad;
+    return ok(explained, console_) ? *explained : kExitBad;
   }
 
  private:

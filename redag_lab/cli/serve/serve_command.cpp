@@ -188,15 +188,9 @@ class Server {
 int serve(const ServeArguments &options, Console &console) {
   const InterruptGuard guard;
   const Result<std::string> token = options.token_file.empty() ? make_token() : read_token(options.token_file);
-  if (!token) {
-    console.note(token.error());
-    return kExitBad;
-  }
+  if (!ok(token, console)) return kExitBad;
   Server server(options, *token);
-  if (const Result<void> listening = server.listen(static_cast<int>(options.port)); !listening) {
-    console.note(listening.error());
-    return kExitBad;
-  }
+  if (!ok(server.listen(static_cast<int>(options.port)), console)) return kExitBad;
   console.print(server.address() + "\n");
   if (!console.flush()) return kExitBad;
   console.note("open this address in a browser of this machine; Ctrl-C ends\n");

@@ -60,4 +60,11 @@ class Console {
   int error_ = 0;  // errno of the first failure
 };
 
+/// Prints the errors of a failed result. Returns true if there are none.
+template <class T>
+[[nodiscard]] bool ok(const Result<T> &result, Console &console) {
+  if (!result) console.note(result.error());
+  return result.has_value();
+}
+
 }  // namespace redag::cli

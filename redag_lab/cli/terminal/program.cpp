@@ -186,10 +186,7 @@ int parse_and_run(const std::vector<std::string> &given, Console &console) {
     actions.emplace_back(command, entry.add(*command));
   }
 
-  if (const auto epoch = source_date_epoch(); !epoch) {
-    console.note(epoch.error());
-    return kExitBad;
-  }
+  if (!ok(source_date_epoch(), console)) return kExitBad;
   if (arguments.empty()) {
     console.note(app.help());
     return kExitBad;

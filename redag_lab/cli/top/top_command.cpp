@@ -74,10 +74,7 @@ int show_once(const TopArguments &options, const std::optional<LiveTarget> &targ
     return kExitBad;
   }
   const live::Listed &listed = pages.front();
-  if (!listed.page) {
-    console.note(listed.page.error());
-    return kExitBad;
-  }
+  if (!ok(listed.page, console)) return kExitBad;
   const StreamTraits &out = console.out_traits();
   console.print(options.json ? to_text(to_json(listed, *listed.page, now))
                              : draw_once(listed, options.view, now, out.width, out.colour));
