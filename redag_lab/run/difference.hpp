@@ -108,8 +108,8 @@ struct DifferenceRow {
 };
 
 struct Difference {
-  std::vector<DifferenceRow> rows;   // rows that both sides have, in the order of A
-  bool of_runs = false;              // whole runs were compared, and not stretches of them
+  std::vector<DifferenceRow> rows;  // rows that both sides have, in the order of A
+  bool of_runs = false;             // whole runs were compared, and not stretches of them
 
   [[nodiscard]] bool is_any(Verdict verdict) const;
 };

@@ -26,12 +26,12 @@ enum class Judge : std::uint8_t {
 /// The quality of a setting: counts of jobs in simulated runs, or of tasks and DAGs with a deadline by their bounds. An
 /// end-to-end deadline counts as the deadline of the jobs that carry the data.
 struct Score {
-  bool proven = false;        // bounds show that every deadline is met
-  std::uint64_t judged = 0;   // jobs released, or deadlines
-  std::uint64_t missed = 0;   // lost or late; or not shown to be met
-  std::uint64_t lost = 0;     // skipped, or aborted although there was data; or without a bound
+  bool proven = false;          // bounds show that every deadline is met
+  std::uint64_t judged = 0;     // jobs released, or deadlines
+  std::uint64_t missed = 0;     // lost or late; or not shown to be met
+  std::uint64_t lost = 0;       // skipped, or aborted although there was data; or without a bound
   std::optional<double> slack;  // the least (deadline - response) / deadline, of jobs or bounds
-  std::uint32_t changes = 0;  // number of differences from the present workload
+  std::uint32_t changes = 0;    // number of differences from the present workload
 
   void see(Duration response, Duration due);
   void add(const Score &run);

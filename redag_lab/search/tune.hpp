@@ -57,8 +57,8 @@ struct Tuned {
 };
 
 /// Tunes a workload. Requires a valid workload, and at least one seed for simulations. The result is never worse than
-/// `workload` for the judge, neither on the seeds of the search nor on the unseen ones. Returns nothing if stopped before
-/// `workload` itself was judged.
+/// `workload` for the judge, neither on the seeds of the search nor on the unseen ones. Returns nothing if stopped
+/// before `workload` itself was judged.
 [[nodiscard]] std::optional<Tuned> tune(const Workload &workload, const TuneOptions &options);
 
 }  // namespace redag::lab

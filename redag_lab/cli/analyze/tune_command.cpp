@@ -143,8 +143,9 @@ Action add_tune(CLI::App &app) {
       ->required();
   app.add_option("-o,--output", options->output, "File for the tuned workload: FILE with its changes")
       ->type_name("FILE");
-  add_choice(app, "--judge", tune.judge, choices_of(std::array{lab::Judge::Simulation, lab::Judge::Bounds}),
-             "What decides which setting is better: the misses in simulated runs, or the bounds of 'redag analyze' alone")
+  add_choice(
+      app, "--judge", tune.judge, choices_of(std::array{lab::Judge::Simulation, lab::Judge::Bounds}),
+      "What decides which setting is better: the misses in simulated runs, or the bounds of 'redag analyze' alone")
       ->default_str(to_string(tune.judge));
   app.add_option("--vary", options->vary,
                  "What may change: workers, max_active, priorities; by default workers,max_active, or "

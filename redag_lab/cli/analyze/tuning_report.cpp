@@ -202,8 +202,8 @@ std::string in_words(const Tuning &tuning) {
 std::string describe(const Tuning &tuning, const StreamTraits &terminal, bool all) {
   const Workload &workload = tuning.tuned.present.workload;
   const lab::TuneOptions &options = tuning.options;
-  std::string text =
-      fmt::format("{}: {}, {}\n", workload.name, to_string(workload.policy), plural(workload.platform.workers, "worker"));
+  std::string text = fmt::format("{}: {}, {}\n", workload.name, to_string(workload.policy),
+                                 plural(workload.platform.workers, "worker"));
   if (options.judge == Judge::Bounds) {
     text += "judged by the bounds, which hold for every execution\n\n";
   } else {

@@ -167,8 +167,8 @@ class Comparing {
     const std::string &folder = options_.run.folder;
     if (!folder.empty()) {
       all_written_ = ok(write_text(folder + "/comparison.json", document), console_) && all_written_;
-      const std::string words =
-          fmt::format("\nwrote {0}/: comparison.json, and the files of each run; 'redag report {0}' makes a page\n", folder);
+      const std::string words = fmt::format(
+          "\nwrote {0}/: comparison.json, and the files of each run; 'redag report {0}' makes a page\n", folder);
       options_.run.json ? console_.note(words) : console_.say(words);
     }
     if (!all_written_) return kExitBad;

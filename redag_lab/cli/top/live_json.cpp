@@ -52,9 +52,9 @@ Json device_json(const live::DeviceFrame &device, const live::Frame &frame) {
 }
 
 Json task_json(const live::TaskFrame &task, const live::Frame &frame) {
-  Json row = {{"dag", frame.dags[task.dag].name},        {"name", task.name},
-              {"period_ns", or_null(task.period)},       {"deadline_ns", or_null(task.deadline)},
-              {"bound_ns", or_null(task.bound)},         {"priority", or_null(task.priority)}};
+  Json row = {{"dag", frame.dags[task.dag].name},  {"name", task.name},
+              {"period_ns", or_null(task.period)}, {"deadline_ns", or_null(task.deadline)},
+              {"bound_ns", or_null(task.bound)},   {"priority", or_null(task.priority)}};
   row.update(figures_json(task.figures, frame));
   return row;
 }

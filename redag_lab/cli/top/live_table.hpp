@@ -21,7 +21,6 @@ namespace redag::cli {
 /// Returns the rows of the pages that `view` shows, with their executors if it shows all.
 [[nodiscard]] Table task_table(std::span<const live::Listed> pages, const LiveView &view);
 
-
 /// Returns one row per executor.
 [[nodiscard]] Table executor_table(const std::vector<live::Listed> &pages, Time now);
 
