@@ -12,7 +12,7 @@ FIGURES.experiment = ['curves'];
 FIGURES.worlds = ['curves', 'worlds'];
 FIGURES.executors = ['worlds'];
 FIGURES.acceptance = ['curves'];
-FIGURES.single = FIGURES.perception = FIGURES.hostile = FIGURES.long = FIGURES.wide = FIGURES.comparison.slice(2);
+FIGURES.single = FIGURES.perception = FIGURES.hostile = FIGURES.long = FIGURES.wide = FIGURES.comparison.slice(1);
 
 export const PHONE = {viewport: {width: 390, height: 844}, isMobile: true, hasTouch: true, deviceScaleFactor: 2};
 

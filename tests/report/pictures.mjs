@@ -14,7 +14,7 @@ import {chromium} from 'playwright-core';
 
 const [executablePath, scratch, redag, source, task] = process.argv.slice(2);
 const states = path.join(source, 'tests', 'report', 'live.json');
-const PICTURES = {report: [1280, 900], experiment_report: [1280, 900], serve: [1280, 1580]};
+const PICTURES = {report: [1280, 900], experiment_report: [1280, 900], serve: [1280, 1180]};
 const PAGES = {report: 'comparison', experiment_report: 'experiment'};
 const CELL = 16;          // pixels; a glyph is smaller
 const NEAR = 16;          // of 255, by which the mean colour of a cell may differ
@@ -79,7 +79,7 @@ function replay(state) {
 async function picture(name) {
   const address = name === 'serve' ? await serve(scratch) : pathToFileURL(path.join(scratch, `${PAGES[name]}.html`)).href;
   const page = await opened(address, PICTURES[name], name === 'serve');
-  await page.waitForTimeout(1500);  // the chart of the live page is drawn once a second
+  await page.waitForTimeout(500);
   assert.doesNotMatch(await page.locator('main').innerText(), /undefined|NaN/);
   const bytes = await page.screenshot();
   await page.close();
