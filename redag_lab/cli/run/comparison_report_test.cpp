@@ -137,7 +137,7 @@ TEST(Comparison, LateEndToEndIsAMiss) {
   EXPECT_TRUE(late.has_misses());
 }
 
-TEST(Comparison, JsonHasEveryRepetition) {
+TEST(Comparison, JsonHasMediansOfTheRepetitions) {
   lab::Comparison comparison;
   comparison.dags = {"control", "total"};
   comparison.executors = {results("redag", {0.5, 0.25, 0.75})};
@@ -145,7 +145,6 @@ TEST(Comparison, JsonHasEveryRepetition) {
   const Json &dag = document["executors"][0]["dags"][0];
   EXPECT_EQ(document["executors"][0]["dags"].size(), 1U) << "the total stands beside the DAGs";
   EXPECT_EQ(dag["miss_ratio_with_lost"]["median"], 0.5);
-  EXPECT_EQ(dag["repetitions"].size(), 3U);
 }
 
 }  // namespace
