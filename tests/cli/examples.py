@@ -160,7 +160,7 @@ class Examples(Case):
                     print(f"{time.monotonic() - begin:5.1f} s  {example}", flush=True)
                     ran += 1
         print(f"{ran} examples ran; not run here:", *(skipped or ["none"]), sep="\n  ", flush=True)
-        self.assertGreater(ran, 45)
+        self.assertGreater(ran, 40)
 
 
 if __name__ == "__main__":
