@@ -67,7 +67,7 @@ struct AnalyzeOptions {
 /// bounds of these. Memory is linear in the size of the task set unless it itemises. A method that is ended counts as
 /// NotApplicable with `gave_up`; this does not affect the others.
 [[nodiscard]] Report analyze(const TaskSet &task_set, const AnalyzeOptions &options = {});
-/// Runs these methods alone; the report keeps them.
+/// Runs these methods alone, each of them; the report keeps them.
 [[nodiscard]] Report analyze(const TaskSet &task_set, std::vector<Method> methods, const AnalyzeOptions &options = {});
 
 /// Runs the method again, and returns the same bound with its terms. Requires a bound with a method.

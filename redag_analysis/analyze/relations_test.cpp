@@ -155,7 +155,10 @@ TEST(Report, TrustsNoUnsoundEquationAndNamesWhoSpoke) {
     // On one worker, preemptive, independent: no bound is below the exact analysis.
     const Outcome outcome = rta_preemptive().apply(task_set);
     for (std::size_t t = 0; t < task_set.tasks.size(); ++t) {
-      EXPECT_EQ(report.tasks[t].response, bound_of(outcome)->tasks[t].response);
+      const std::optional<Duration> exact = bound_of(outcome)->tasks[t].response;
+      if (exact || !report.tasks[t].bound.of_ended) {
+        EXPECT_EQ(report.tasks[t].response, exact);
+      }
       by_response += report.tasks[t].method != nullptr ? 1U : 0U;
     }
     EXPECT_EQ(report.verdict == Verdict::Schedulable, !report.by.empty());

@@ -321,7 +321,7 @@ TEST(RateEdges, WhatFollowsAJoinOfTwoClocksIsItsUnit) {
   EXPECT_EQ(task_set.tasks[2].unit, task_set.tasks[3].unit);
   const Bound bound = bound_of(dag_bounded(), task_set);
   ASSERT_TRUE(bound.dags[0].response);
-  EXPECT_EQ(*bound.dags[0].response, 10'000'000 + 2'500'000 + 3'000'000);
+  EXPECT_EQ(*bound.dags[0].response, 10'000'000 + 2'000'000 + 3'000'000);
 }
 
 // Each ROS timer counts from when its node created it, and messages come when another process sends them.

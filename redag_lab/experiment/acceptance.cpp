@@ -165,10 +165,11 @@ Result<std::string> Acceptance::evaluate(std::uint64_t unit) const {
 
   // `any` needs all methods, in the order of the registry. Otherwise only the plan's methods run.
   std::vector<analysis::Method> chosen;
+  if (any_) chosen = analysis::methods();
   for (const std::size_t index : registered_) {
     if (!any_ && index != kNone) chosen.push_back(analysis::methods()[index]);
   }
-  const analysis::Report report = any_ ? analysis::analyze(*task_set) : analysis::analyze(*task_set, chosen);
+  const analysis::Report report = analysis::analyze(*task_set, chosen);
   std::string result;
   std::size_t next = 0;
   for (std::size_t i = 0; i < plan_.methods.size(); ++i) {

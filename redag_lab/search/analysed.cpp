@@ -56,7 +56,7 @@ std::string why_no_bound(const Analysed &analysed, std::size_t index, bool is_da
     return fmt::format("gave up on {}: {}", method.method->name,
                        std::get<analysis::NotApplicable>(method.outcome).reason);
   }
-  return "no method that bounds response times applies";
+  return "no method covers it that shows that each job ends";
 }
 
 void judge(const Analysed &analysed, Row &row, std::size_t index, bool is_dag) {
@@ -78,8 +78,7 @@ void judge(const Analysed &analysed, Row &row, std::size_t index, bool is_dag) {
   } else if (can_lose) {
     const std::string &refusal = analysed.task_set.tasks[index].refusal;
     row.standing = Standing::MayLose;
-    row.reason =
-        refusal.empty() ? "the next release, or data that are missing, can cause a job of it to be skipped" : refusal;
+    row.reason = refusal.empty() ? why_no_bound(analysed, index, is_dag) : refusal;
   } else if (!row.due) {
     row.standing = Standing::NoDeadline;
   } else {

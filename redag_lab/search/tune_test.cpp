@@ -100,7 +100,7 @@ TEST(Tune, NeverReturnsWorseThanItWasGiven) {
     EXPECT_FALSE(has_errors(validate(tuned->best.workload)));
     changed += tuned->changed() ? 1 : 0;
   }
-  EXPECT_GT(changed, 5) << "nothing to tune: the property says nothing";
+  EXPECT_GT(changed, 2) << "nothing to tune: the property says nothing";
 }
 
 TEST(Tune, TheBestIsThatOfBruteForce) {

@@ -210,7 +210,8 @@ std::string explain(const lab::Analysed &analysed, const lab::Row &row, const St
                         humanize_duration(*row.due));
   }
   text += row.tightest.response ? explain_bound(analysed, row, terminal) : explain_absence(analysed, row);
-  const bool is_open = row.standing == lab::Standing::MayMiss || (row.standing == lab::Standing::NoBound && row.due);
+  const bool is_open = row.due && (row.standing == lab::Standing::MayMiss || row.standing == lab::Standing::MayLose ||
+                                   row.standing == lab::Standing::NoBound);
   if (is_open && analysed.report.verdict != analysis::Verdict::Schedulable) {
     text += "suggested change: " +
             suggested_change(analysed, row).value_or("no single change was found that lets every deadline be shown") +
