@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "redag_analysis/core/arithmetic.hpp"
 #include "redag_analysis/core/bound.hpp"
 #include "redag_analysis/many_workers/global.hpp"
 
@@ -20,8 +21,8 @@ namespace global {
 /// executes as late and all others as early as they can, `width` at a time. For width = m this is A. Melani et al.,
 /// ECRTS 2015, eq. 9, in exact arithmetic with units of 1 / width. Requires response >= volume / width.
 [[nodiscard]] inline Duration dag_work(const GlobalUnit &dag, Duration x) {
-  const Division jobs = divide((x + dag.response) * static_cast<Duration>(dag.width) - dag.volume, dag);
-  return jobs.quotient * dag.volume + std::min(dag.volume, jobs.remainder);
+  const Division jobs = divide(multiply(add(x, dag.response), static_cast<Duration>(dag.width)) - dag.volume, dag);
+  return add(multiply(jobs.quotient, dag.volume), std::min(dag.volume, jobs.remainder));
 }
 
 /// How a DAG's critical path waits under dag_bounded().

@@ -326,7 +326,7 @@ TEST_F(Import, MeasuresWhatComesFromOutside) {
     nodes.take(1, image, kSecond + k * 33'333'333 + 100'000 * (k % 2));  // sent with less jitter than it is taken
     nodes.run(1, image, nodes.now, ms);
   }
-  const Task &task = task_named(import(recording), "/viewer");
+  const Task task = task_named(import(recording), "/viewer");
   EXPECT_EQ(task.period, 33'333'333);
   EXPECT_EQ(task.phase, Phase::Unknown);
   EXPECT_NEAR(static_cast<double>(task.jitter), 100'000, 5000);
