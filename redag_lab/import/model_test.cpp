@@ -170,7 +170,7 @@ std::string all_remarks(const ImportedWorkload &imported) {
 }
 
 class Import : public ::testing::Test {
- protected:
+ public:
   Recording recording;
   RecordedNodes nodes{recording};
 };
