@@ -25,7 +25,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
 
-constexpr Time ms = kMillisecond;
+constexpr Time kMs = kMillisecond;
 
 // Writes the events of one process as rclcpp records them. Handles are numbers that it gives out.
 class RecordedNodes {
@@ -146,12 +146,12 @@ ImportedWorkload import(const Recording &recording, std::uint32_t process = 1) {
 }
 
 const Task &task_named(const ImportedWorkload &imported, const std::string &part) {
-  static const Task none;
+  static const Task kNone;
   for (const TaskRef &ref : flatten(imported.workload)) {
     if (ref.task->name.find(part) != std::string::npos) return *ref.task;
   }
   ADD_FAILURE() << "no task " << part << " in\n" << to_yaml(imported);
-  return none;
+  return kNone;
 }
 
 std::string notes_of(const ImportedWorkload &imported, const std::string &part) {
@@ -178,12 +178,12 @@ class Import : public ::testing::Test {
 TEST_F(Import, FindsTimersAndWhatFollowsThem) {
   const auto lidar = nodes.node("lidar");
   const auto planner = nodes.node("planner");
-  const auto scan = nodes.timer(lidar, 100 * ms);
+  const auto scan = nodes.timer(lidar, 100 * kMs);
   const auto publisher = nodes.publisher(lidar, "/scan");
   const auto plan = nodes.subscription(planner, "/scan");
   for (Time k = 1; k <= 20; ++k) {
-    nodes.run(1, scan, k * 100 * ms, 2 * ms + k, publisher);
-    nodes.run(2, plan, k * 100 * ms + 3 * ms, 5 * ms);
+    nodes.run(1, scan, k * 100 * kMs, 2 * kMs + k, publisher);
+    nodes.run(2, plan, k * 100 * kMs + 3 * kMs, 5 * kMs);
   }
   const ImportedWorkload imported = import(recording);
   ASSERT_EQ(imported.workload.dags.size(), 1U);
@@ -194,45 +194,45 @@ TEST_F(Import, FindsTimersAndWhatFollowsThem) {
   EXPECT_EQ(dag.edges, Edges::Seen);
   ASSERT_EQ(dag.tasks.size(), 2U);
   EXPECT_EQ(dag.tasks[0].name, "/lidar timer 100 ms (0)");
-  EXPECT_EQ(dag.tasks[0].period, 100 * ms);
+  EXPECT_EQ(dag.tasks[0].period, 100 * kMs);
   EXPECT_EQ(dag.tasks[0].phase, Phase::Unknown);
-  EXPECT_EQ(dag.tasks[0].wcet, 2 * ms + 20);
-  EXPECT_EQ(dag.tasks[0].bcet, 2 * ms + 1);
-  EXPECT_EQ(dag.tasks[0].callback, (Callback{"/lidar", Callback::Kind::Timer, {}, 100 * ms, 0U}));
+  EXPECT_EQ(dag.tasks[0].wcet, 2 * kMs + 20);
+  EXPECT_EQ(dag.tasks[0].bcet, 2 * kMs + 1);
+  EXPECT_EQ(dag.tasks[0].callback, (Callback{"/lidar", Callback::Kind::Timer, {}, 100 * kMs, 0U}));
   EXPECT_EQ(dag.tasks[1].activation, Activation::Data);
-  EXPECT_EQ(dag.tasks[1].period, 100 * ms);
+  EXPECT_EQ(dag.tasks[1].period, 100 * kMs);
   EXPECT_THAT(dag.tasks[1].predecessors, ElementsAre(0U));
-  EXPECT_EQ(dag.tasks[1].wcet, 5 * ms);
+  EXPECT_EQ(dag.tasks[1].wcet, 5 * kMs);
   EXPECT_EQ(imported.executed, imported.explained);
   EXPECT_EQ(imported.over_edges, 20U);
-  EXPECT_EQ(imported.responses[0].max, 2 * ms + 20);
-  EXPECT_EQ(imported.responses[1].max, 6 * ms - 1);  // from the message, at the end of the scan
+  EXPECT_EQ(imported.responses[0].max, 2 * kMs + 20);
+  EXPECT_EQ(imported.responses[1].max, 6 * kMs - 1);  // from the message, at the end of the scan
   EXPECT_EQ(imported.overhead, 0);
   EXPECT_THAT(all_remarks(imported), HasSubstr("wall time"));
   EXPECT_THAT(notes_of(imported, "/lidar"), HasSubstr("longest of 20 runs"));
 }
 
 TEST_F(Import, KnowsWhenTimersExpired) {
-  const auto timer = nodes.timer(nodes.node("early"), 10 * ms);
-  for (Time k = 1; k <= 100; ++k) nodes.run(1, timer, k * 10 * ms + (k % 2 == 0 ? -2000 : 60'000), ms);
+  const auto timer = nodes.timer(nodes.node("early"), 10 * kMs);
+  for (Time k = 1; k <= 100; ++k) nodes.run(1, timer, k * 10 * kMs + (k % 2 == 0 ? -2000 : 60'000), kMs);
   const ImportedWorkload imported = import(recording);
-  EXPECT_EQ(imported.responses[0].min, ms);
-  EXPECT_EQ(imported.responses[0].max, ms + 60'000);
+  EXPECT_EQ(imported.responses[0].min, kMs);
+  EXPECT_EQ(imported.responses[0].max, kMs + 60'000);
 }
 
 TEST_F(Import, SplitsWhereRatesDiffer) {
   const auto node = nodes.node("camera");
-  const auto timer = nodes.timer(node, 10 * ms);
+  const auto timer = nodes.timer(node, 10 * kMs);
   const auto publisher = nodes.publisher(node, "/image");
   const auto slow = nodes.subscription(nodes.node("detect"), "/image");
   for (Time k = 1; k <= 100; ++k) {
     const bool sends = k % 5 == 0;
-    nodes.run(1, timer, k * 10 * ms, ms, sends ? publisher : 0);
-    if (sends) nodes.run(2, slow, k * 10 * ms + 2 * ms, 3 * ms);
+    nodes.run(1, timer, k * 10 * kMs, kMs, sends ? publisher : 0);
+    if (sends) nodes.run(2, slow, k * 10 * kMs + 2 * kMs, 3 * kMs);
   }
   const ImportedWorkload imported = import(recording);
   EXPECT_EQ(imported.workload.dags.size(), 2U);
-  EXPECT_EQ(task_named(imported, "/detect").period, 50 * ms);
+  EXPECT_EQ(task_named(imported, "/detect").period, 50 * kMs);
   EXPECT_THAT(task_named(imported, "/detect").predecessors, IsEmpty());
   EXPECT_THAT(notes_of(imported, "/detect"), HasSubstr("publishes /image 20 times in 100 runs"));
 }
@@ -242,50 +242,50 @@ TEST_F(Import, JoinsCallbacksThatWaitForEachOther) {
   const auto left = nodes.node("left");
   const auto right = nodes.node("right");
   const auto fuse = nodes.node("fuse");
-  const auto a = nodes.timer(left, 20 * ms);
-  const auto b = nodes.timer(right, 20 * ms);
+  const auto a = nodes.timer(left, 20 * kMs);
+  const auto b = nodes.timer(right, 20 * kMs);
   const auto to_a = nodes.publisher(left, "/a");
   const auto to_b = nodes.publisher(right, "/b");
   const auto to_c = nodes.publisher(fuse, "/c");
   const auto from_a = nodes.subscription(fuse, "/a");
   const auto from_b = nodes.subscription(fuse, "/b");
   for (Time k = 1; k <= 40; ++k) {
-    nodes.run(1, a, k * 20 * ms, ms, to_a);
-    nodes.run(1, b, k * 20 * ms + ms, ms, to_b);
+    nodes.run(1, a, k * 20 * kMs, kMs, to_a);
+    nodes.run(1, b, k * 20 * kMs + kMs, kMs, to_b);
     const bool a_first = k % 3 == 0;
-    nodes.run(2, a_first ? from_a : from_b, k * 20 * ms + 3 * ms, 1000);
-    nodes.run(2, a_first ? from_b : from_a, k * 20 * ms + 4 * ms, 6 * ms, to_c);
+    nodes.run(2, a_first ? from_a : from_b, k * 20 * kMs + 3 * kMs, 1000);
+    nodes.run(2, a_first ? from_b : from_a, k * 20 * kMs + 4 * kMs, 6 * kMs, to_c);
   }
   const ImportedWorkload imported = import(recording);
   ASSERT_EQ(imported.workload.task_count(), 3U) << to_yaml(imported);
   const Task &joined = task_named(imported, "/fuse");
   EXPECT_EQ(joined.activation, Activation::Data);
   EXPECT_EQ(joined.predecessors.size(), 2U);
-  EXPECT_EQ(joined.bcet, 6 * ms);  // storing is no job
+  EXPECT_EQ(joined.bcet, 6 * kMs);  // storing is no job
   EXPECT_THAT(notes_of(imported, "/fuse"), HasSubstr("one job of /a and /b: the last of a round does it"));
 }
 
 TEST_F(Import, JoinsCallbacksThatPublishNothing) {
   const auto left = nodes.node("left");
   const auto fuse = nodes.node("fuse");
-  const auto a = nodes.timer(left, 20 * ms);
-  const auto b = nodes.timer(left, 20 * ms);
+  const auto a = nodes.timer(left, 20 * kMs);
+  const auto b = nodes.timer(left, 20 * kMs);
   const auto to_a = nodes.publisher(left, "/a");
   const auto to_b = nodes.publisher(left, "/b");
   const auto from_a = nodes.subscription(fuse, "/a");
   const auto from_b = nodes.subscription(fuse, "/b");
   for (Time k = 1; k <= 40; ++k) {
-    nodes.run(1, a, k * 20 * ms, ms, to_a);
-    nodes.run(1, b, k * 20 * ms + ms, ms, to_b);
+    nodes.run(1, a, k * 20 * kMs, kMs, to_a);
+    nodes.run(1, b, k * 20 * kMs + kMs, kMs, to_b);
     const bool a_first = k % 3 == 0;
-    nodes.run(2, a_first ? from_a : from_b, k * 20 * ms + 3 * ms, 1000);
-    nodes.run(2, a_first ? from_b : from_a, k * 20 * ms + 4 * ms, 6 * ms + k);
+    nodes.run(2, a_first ? from_a : from_b, k * 20 * kMs + 3 * kMs, 1000);
+    nodes.run(2, a_first ? from_b : from_a, k * 20 * kMs + 4 * kMs, 6 * kMs + k);
   }
   const ImportedWorkload imported = import(recording);
   ASSERT_EQ(imported.workload.task_count(), 3U) << to_yaml(imported);
   EXPECT_EQ(task_named(imported, "/fuse").predecessors.size(), 2U);
-  EXPECT_EQ(task_named(imported, "/fuse").bcet, 6 * ms + 1);
-  EXPECT_EQ(task_named(imported, "/fuse").wcet, 6 * ms + 40);
+  EXPECT_EQ(task_named(imported, "/fuse").bcet, 6 * kMs + 1);
+  EXPECT_EQ(task_named(imported, "/fuse").wcet, 6 * kMs + 40);
 }
 
 TEST_F(Import, KeepsCallbacksApartOfWhichOneAlwaysWorks) {
@@ -293,8 +293,8 @@ TEST_F(Import, KeepsCallbacksApartOfWhichOneAlwaysWorks) {
   const auto tiny = nodes.subscription(node, "/a");
   const auto big = nodes.subscription(node, "/b");
   for (Time k = 1; k <= 40; ++k) {
-    nodes.run(1, tiny, k * 20 * ms, 1000);
-    nodes.run(1, big, k * 20 * ms + ms, 6 * ms);
+    nodes.run(1, tiny, k * 20 * kMs, 1000);
+    nodes.run(1, big, k * 20 * kMs + kMs, 6 * kMs);
   }
   EXPECT_EQ(import(recording).workload.task_count(), 2U);
 }
@@ -302,19 +302,19 @@ TEST_F(Import, KeepsCallbacksApartOfWhichOneAlwaysWorks) {
 TEST_F(Import, TakesTwoPublishersAsTwoReleases) {
   const auto one = nodes.node("one");
   const auto two = nodes.node("two");
-  const auto a = nodes.timer(one, 20 * ms);
-  const auto b = nodes.timer(two, 20 * ms);
+  const auto a = nodes.timer(one, 20 * kMs);
+  const auto b = nodes.timer(two, 20 * kMs);
   const auto from_a = nodes.publisher(one, "/tf");
   const auto from_b = nodes.publisher(two, "/tf");
   const auto tf = nodes.subscription(nodes.node("listener"), "/tf");
   for (Time k = 1; k <= 40; ++k) {
-    nodes.run(1, a, k * 20 * ms, ms, from_a);
-    nodes.run(1, tf, k * 20 * ms + 2 * ms, 1000);
-    nodes.run(1, b, k * 20 * ms + 10 * ms, ms, from_b);
-    nodes.run(1, tf, k * 20 * ms + 12 * ms, 1000);
+    nodes.run(1, a, k * 20 * kMs, kMs, from_a);
+    nodes.run(1, tf, k * 20 * kMs + 2 * kMs, 1000);
+    nodes.run(1, b, k * 20 * kMs + 10 * kMs, kMs, from_b);
+    nodes.run(1, tf, k * 20 * kMs + 12 * kMs, 1000);
   }
   const ImportedWorkload imported = import(recording);
-  EXPECT_EQ(task_named(imported, "/listener").period, 10 * ms);
+  EXPECT_EQ(task_named(imported, "/listener").period, 10 * kMs);
   EXPECT_THAT(notes_of(imported, "/listener"), HasSubstr("several publishers"));
   EXPECT_EQ(imported.as_sources, 80U);
 }
@@ -324,7 +324,7 @@ TEST_F(Import, MeasuresWhatComesFromOutside) {
   for (Time k = 0; k < 100; ++k) {
     nodes.now = k * 33'333'333 + 1'000'000 * (k % 7);
     nodes.take(1, image, kSecond + k * 33'333'333 + 100'000 * (k % 2));  // sent with less jitter than it is taken
-    nodes.run(1, image, nodes.now, ms);
+    nodes.run(1, image, nodes.now, kMs);
   }
   const Task task = task_named(import(recording), "/viewer");
   EXPECT_EQ(task.period, 33'333'333);
@@ -334,23 +334,23 @@ TEST_F(Import, MeasuresWhatComesFromOutside) {
 
 TEST_F(Import, TakesServicesAsEvents) {
   const auto service = nodes.service(nodes.node("map"), "/map/save");
-  for (const Time at : {0, 100, 190, 400, 520}) nodes.run(1, service, at * ms, ms);
+  for (const Time at : {0, 100, 190, 400, 520}) nodes.run(1, service, at * kMs, kMs);
   const ImportedWorkload imported = import(recording);
   const Task &task = task_named(imported, "/map");
   EXPECT_EQ(task.phase, Phase::Event);
-  EXPECT_EQ(task.period, 90 * ms);
+  EXPECT_EQ(task.period, 90 * kMs);
   EXPECT_THAT(notes_of(imported, "/map"), HasSubstr("shortest distance"));
 }
 
 TEST_F(Import, SaysWhatHasNoRate) {
   const auto node = nodes.node("late");
-  const auto timer = nodes.timer(node, 10 * ms);
+  const auto timer = nodes.timer(node, 10 * kMs);
   const auto latched = nodes.subscription(node, "/map");
-  const auto once = nodes.timer(node, 5 * ms);
+  const auto once = nodes.timer(node, 5 * kMs);
   (void)nodes.subscription(node, "/never");
-  nodes.run(1, latched, ms, ms);
-  nodes.run(1, once, 5 * ms, ms);
-  for (Time k = 1; k <= 100; ++k) nodes.run(1, timer, k * 10 * ms, ms);
+  nodes.run(1, latched, kMs, kMs);
+  nodes.run(1, once, 5 * kMs, kMs);
+  for (Time k = 1; k <= 100; ++k) nodes.run(1, timer, k * 10 * kMs, kMs);
   const ImportedWorkload imported = import(recording);
   EXPECT_EQ(imported.workload.task_count(), 1U);
   EXPECT_THAT(imported.left_out,
@@ -361,32 +361,32 @@ TEST_F(Import, SaysWhatHasNoRate) {
 }
 
 TEST_F(Import, SubtractsTimeWithoutAProcessor) {
-  const auto timer = nodes.timer(nodes.node("worker"), 10 * ms);
+  const auto timer = nodes.timer(nodes.node("worker"), 10 * kMs);
   for (Time k = 1; k <= 10; ++k) {
-    nodes.now = k * 10 * ms;
+    nodes.now = k * 10 * kMs;
     nodes.start(7, timer);
-    nodes.now += ms;
+    nodes.now += kMs;
     nodes.switch_to(7, 99);
-    nodes.now += 3 * ms;
+    nodes.now += 3 * kMs;
     nodes.switch_to(99, 7);
-    nodes.now += ms;
+    nodes.now += kMs;
     nodes.end(7, timer);
   }
   const ImportedWorkload imported = import(recording);
-  EXPECT_EQ(task_named(imported, "/worker").wcet, 2 * ms);
+  EXPECT_EQ(task_named(imported, "/worker").wcet, 2 * kMs);
   EXPECT_THAT(all_remarks(imported), HasSubstr("processor time"));
 }
 
 TEST_F(Import, AssumesOneGroupOfWhatNeverOverlapped) {
   const auto node = nodes.node("driver");
-  const auto a = nodes.timer(node, 10 * ms);
-  const auto b = nodes.timer(node, 20 * ms);
-  const auto c = nodes.timer(node, 40 * ms);
+  const auto a = nodes.timer(node, 10 * kMs);
+  const auto b = nodes.timer(node, 20 * kMs);
+  const auto c = nodes.timer(node, 40 * kMs);
   for (Time k = 1; k <= 40; ++k) {
-    nodes.run(1, a, k * 10 * ms, ms);
-    if (k % 2 == 0) nodes.run(2, b, k * 10 * ms + 2 * ms, ms);
+    nodes.run(1, a, k * 10 * kMs, kMs);
+    if (k % 2 == 0) nodes.run(2, b, k * 10 * kMs + 2 * kMs, kMs);
     if (k % 4 != 0) continue;
-    nodes.now = k * 10 * ms + 5 * ms;
+    nodes.now = k * 10 * kMs + 5 * kMs;
     nodes.start(1, c);
     nodes.run(2, a, nodes.now + 1000, 1000);  // while c runs
     nodes.end(1, c);
@@ -399,12 +399,12 @@ TEST_F(Import, AssumesOneGroupOfWhatNeverOverlapped) {
 }
 
 TEST_F(Import, SeesReentrantCallbacks) {
-  const auto timer = nodes.timer(nodes.node("wide"), 10 * ms);
+  const auto timer = nodes.timer(nodes.node("wide"), 10 * kMs);
   for (Time k = 1; k <= 20; ++k) {
-    nodes.now = k * 10 * ms;
+    nodes.now = k * 10 * kMs;
     nodes.start(1, timer);
     nodes.start(2, timer);
-    nodes.now += ms;
+    nodes.now += kMs;
     nodes.end(1, timer);
     nodes.end(2, timer);
   }
@@ -419,11 +419,11 @@ TEST_F(Import, OpensCircles) {
   const auto to_pong = nodes.publisher(node, "/ping");
   const auto to_ping = nodes.publisher(other, "/pong");
   for (Time k = 0; k < 50; ++k) {
-    nodes.run(1, ping, k * 10 * ms, ms, to_pong);
-    nodes.run(1, pong, k * 10 * ms + 5 * ms, ms, to_ping);
+    nodes.run(1, ping, k * 10 * kMs, kMs, to_pong);
+    nodes.run(1, pong, k * 10 * kMs + 5 * kMs, kMs, to_ping);
   }
   const ImportedWorkload imported = import(recording);
-  EXPECT_EQ(task_named(imported, "/ping sub").period, 10 * ms);
+  EXPECT_EQ(task_named(imported, "/ping sub").period, 10 * kMs);
   EXPECT_THAT(task_named(imported, "/pong sub").predecessors.size(), 1U);
   EXPECT_THAT(notes_of(imported, "/ping sub"), HasSubstr("circle"));
 }
@@ -431,7 +431,7 @@ TEST_F(Import, OpensCircles) {
 // A subscription takes messages of its own process by a second object, which names its callback first.
 TEST_F(Import, KnowsCallbacksOfIntraProcessMessages) {
   const auto node = nodes.node("near");
-  const auto timer = nodes.timer(node, 10 * ms);
+  const auto timer = nodes.timer(node, 10 * kMs);
   const auto publisher = nodes.publisher(node, "/data");
   constexpr std::uint64_t kHandle = 10;
   constexpr std::uint64_t kObject = 11;
@@ -440,13 +440,13 @@ TEST_F(Import, KnowsCallbacksOfIntraProcessMessages) {
   nodes.add(RosEvent::Kind::SubscriptionCallback, kObject, kCallback);
   nodes.add(RosEvent::Kind::SubscriptionObject, kHandle, kObject);
   for (Time k = 1; k <= 20; ++k) {
-    nodes.now = k * 10 * ms;
+    nodes.now = k * 10 * kMs;
     nodes.start(1, timer);
     nodes.add(RosEvent::Kind::IntraPublish, publisher);
     nodes.publish(1, publisher);  // the same message, for other processes
     nodes.end(1, timer);
     nodes.start(1, kCallback, true);
-    nodes.now += ms;
+    nodes.now += kMs;
     nodes.end(1, kCallback);
   }
   EXPECT_THAT(task_named(import(recording), "/taker").predecessors, ElementsAre(0U));
@@ -455,7 +455,7 @@ TEST_F(Import, KnowsCallbacksOfIntraProcessMessages) {
 TEST_F(Import, SaysWhenASenderLeftNoEvents) {
   const auto hidden = nodes.subscription(nodes.node("taker"), "/data");
   for (Time k = 1; k <= 20; ++k) {
-    nodes.now = k * 10 * ms;
+    nodes.now = k * 10 * kMs;
     nodes.start(1, hidden, true);
     nodes.end(1, hidden);
   }
@@ -463,17 +463,17 @@ TEST_F(Import, SaysWhenASenderLeftNoEvents) {
 }
 
 TEST_F(Import, CountsWhatWasNotRecorded) {
-  const auto timer = nodes.timer(nodes.node("seen"), 10 * ms);
+  const auto timer = nodes.timer(nodes.node("seen"), 10 * kMs);
   nodes.end(1, timer);  // it began before the recording
   for (Time k = 1; k <= 10; ++k) {
-    nodes.run(1, timer, k * 10 * ms, ms);
-    nodes.run(1, 77, k * 10 * ms + 2 * ms, ms);
+    nodes.run(1, timer, k * 10 * kMs, kMs);
+    nodes.run(1, 77, k * 10 * kMs + 2 * kMs, kMs);
   }
   nodes.start(1, timer);
-  nodes.run(1, 77, nodes.now, ms);
+  nodes.run(1, 77, nodes.now, kMs);
   const ImportedWorkload imported = import(recording);
-  EXPECT_EQ(imported.executed, 21 * ms);
-  EXPECT_EQ(imported.explained, 10 * ms);
+  EXPECT_EQ(imported.executed, 21 * kMs);
+  EXPECT_EQ(imported.explained, 10 * kMs);
   EXPECT_THAT(all_remarks(imported), HasSubstr("unknown: 11 runs of callbacks whose creation was not recorded"));
   EXPECT_THAT(all_remarks(imported), HasSubstr("unknown: 1 run whose begin or end"));
 }
@@ -481,66 +481,66 @@ TEST_F(Import, CountsWhatWasNotRecorded) {
 // A callback that spins another executor inside does not execute what runs there.
 TEST_F(Import, DividesTimeBetweenNestedCallbacks) {
   const auto node = nodes.node("outer");
-  const auto outer = nodes.timer(node, 10 * ms);
-  const auto inner = nodes.timer(node, 20 * ms);
+  const auto outer = nodes.timer(node, 10 * kMs);
+  const auto inner = nodes.timer(node, 20 * kMs);
   for (Time k = 1; k <= 10; ++k) {
-    nodes.now = k * 20 * ms;
+    nodes.now = k * 20 * kMs;
     nodes.start(1, outer);
-    nodes.run(1, inner, nodes.now + ms, 2 * ms);
-    nodes.now += ms;
+    nodes.run(1, inner, nodes.now + kMs, 2 * kMs);
+    nodes.now += kMs;
     nodes.end(1, outer);
   }
   const ImportedWorkload imported = import(recording);
-  EXPECT_EQ(task_named(imported, " 10 ms").wcet, 2 * ms);
-  EXPECT_EQ(task_named(imported, " 20 ms").wcet, 2 * ms);
+  EXPECT_EQ(task_named(imported, " 10 ms").wcet, 2 * kMs);
+  EXPECT_EQ(task_named(imported, " 20 ms").wcet, 2 * kMs);
 }
 
 TEST_F(Import, DoubtsTheClockOfATimer) {
   const auto node = nodes.node("sim");
-  const auto fast = nodes.timer(node, 100 * ms);
-  const auto slow = nodes.timer(node, 10 * ms);
+  const auto fast = nodes.timer(node, 100 * kMs);
+  const auto slow = nodes.timer(node, 10 * kMs);
   for (Time k = 1; k <= 50; ++k) {
-    nodes.run(1, fast, k * 50 * ms, ms);
-    nodes.run(1, slow, k * 50 * ms + 2 * ms, ms);
+    nodes.run(1, fast, k * 50 * kMs, kMs);
+    nodes.run(1, slow, k * 50 * kMs + 2 * kMs, kMs);
   }
   const ImportedWorkload imported = import(recording);
-  EXPECT_EQ(task_named(imported, "100 ms").period, 50 * ms);
-  EXPECT_EQ(task_named(imported, " 10 ms").period, 10 * ms);
+  EXPECT_EQ(task_named(imported, "100 ms").period, 50 * kMs);
+  EXPECT_EQ(task_named(imported, " 10 ms").period, 10 * kMs);
   EXPECT_THAT(notes_of(imported, " 10 ms"), HasSubstr("unknown"));
 }
 
 TEST_F(Import, KeepsProcessesApart) {
   RecordedNodes second(recording, 2);  // the same handles as in the first process
-  const auto talk = nodes.timer(nodes.node("talker"), 10 * ms);
-  const auto listen = second.timer(second.node("listener"), 20 * ms);
+  const auto talk = nodes.timer(nodes.node("talker"), 10 * kMs);
+  const auto listen = second.timer(second.node("listener"), 20 * kMs);
   for (Time k = 1; k <= 20; ++k) {
-    nodes.run(1, talk, k * 20 * ms, ms);
-    second.run(1, listen, k * 20 * ms, 2 * ms);
+    nodes.run(1, talk, k * 20 * kMs, kMs);
+    second.run(1, listen, k * 20 * kMs, 2 * kMs);
   }
-  EXPECT_EQ(task_named(import(recording, 1), "/talker").wcet, ms);
-  EXPECT_EQ(task_named(import(recording, 2), "/listener").wcet, 2 * ms);
+  EXPECT_EQ(task_named(import(recording, 1), "/talker").wcet, kMs);
+  EXPECT_EQ(task_named(import(recording, 2), "/listener").wcet, 2 * kMs);
 }
 
 TEST_F(Import, RefusesCallbacksThatWereNotSeenToBeCreated) {
-  for (Time k = 1; k <= 5; ++k) nodes.run(1, 77, k * 10 * ms, ms);
+  for (Time k = 1; k <= 5; ++k) nodes.run(1, 77, k * 10 * kMs, kMs);
   const Result<ImportedWorkload> imported = import_workload(recording, 1);
   ASSERT_FALSE(imported);
   EXPECT_THAT(to_string(imported.error()), HasSubstr("before the nodes start"));
 }
 
 TEST_F(Import, RefusesNamesThatNoFileCanHold) {
-  const auto timer = nodes.timer(nodes.node("a\nplatform: {workers: 1}"), 10 * ms);
-  for (Time k = 1; k <= 5; ++k) nodes.run(1, timer, k * 10 * ms, ms);
+  const auto timer = nodes.timer(nodes.node("a\nplatform: {workers: 1}"), 10 * kMs);
+  for (Time k = 1; k <= 5; ++k) nodes.run(1, timer, k * 10 * kMs, kMs);
   EXPECT_FALSE(import_workload(recording, 1));
 }
 
 TEST(Arrivals, OfALossyBus) {
   std::vector<Time> instants;
   for (Time k = 0; k < 200; ++k) {
-    if (k % 10 != 3) instants.push_back(k * 5 * ms + (k % 3) * 20'000);
+    if (k % 10 != 3) instants.push_back(k * 5 * kMs + (k % 3) * 20'000);
   }
   const Arrivals arrivals = estimate_arrivals(instants);
-  EXPECT_EQ(arrivals.period, 5 * ms);
+  EXPECT_EQ(arrivals.period, 5 * kMs);
   EXPECT_FALSE(arrivals.sporadic);
   EXPECT_NEAR(static_cast<double>(arrivals.jitter), 40'000, 1000);
   EXPECT_THAT(arrivals.note, HasSubstr("20 of 200 did not come"));
@@ -549,10 +549,10 @@ TEST(Arrivals, OfALossyBus) {
 TEST(Arrivals, OfBursts) {
   std::vector<Time> instants;
   for (Time k = 0; k < 100; ++k) {
-    for (const Time at : {0, 10'000, 70'000}) instants.push_back(k * 100 * ms + at);
+    for (const Time at : {0, 10'000, 70'000}) instants.push_back(k * 100 * kMs + at);
   }
   const Arrivals arrivals = estimate_arrivals(instants);
-  EXPECT_NEAR(static_cast<double>(arrivals.period), 100.0 / 3 * ms, ms);
+  EXPECT_NEAR(static_cast<double>(arrivals.period), 100.0 / 3 * kMs, kMs);
   EXPECT_EQ(arrivals.jitter, arrivals.period);
   EXPECT_THAT(arrivals.note, HasSubstr("unknown"));
 }
