@@ -19,11 +19,9 @@
 namespace redag::lab {
 namespace {
 
-using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-using ::testing::Not;
 
 constexpr Time kMs = kMillisecond;
 
