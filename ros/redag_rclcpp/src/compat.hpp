@@ -305,4 +305,19 @@ inline std::vector<rclcpp::CallbackGroup::SharedPtr> keep_groups(rclcpp::Executo
   return kept;
 }
 
+/// Takes removed entities out of the wait set that the base class fills and ReDAGExecutor never uses: no other executor
+/// could wait for them. rclcpp itself does so when it waits next.
+inline void release_removed(rclcpp::Executor &executor) {
+#if RCLCPP_VERSION_MAJOR >= 28
+  struct Opened : rclcpp::Executor {
+    using Executor::collect_entities;
+    using Executor::mutex_;
+  };
+  const std::lock_guard<std::mutex> guard(executor.*(&Opened::mutex_));
+  (executor.*(&Opened::collect_entities))();
+#else
+  (void)executor;
+#endif
+}
+
 }  // namespace redag_rclcpp::compat

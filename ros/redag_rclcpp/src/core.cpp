@@ -52,7 +52,7 @@ ReDAGExecutor::Core::Core(const rclcpp::Context::SharedPtr &context, ReDAGOption
               .workers = setup_.config.workers, .preemption = setup_.mode.mode, .devices = options_.devices},
           setup_.config.policy, setup_.config.ties, options_.workload ? &*options_.workload : nullptr),
       registry_(context, options_, setup_.config.workers,
-                {.engine = *engine_, .timer = timer_, .bridge = bridge_, .tasks = tasks_}),
+                {.engine = *engine_, .timer = timer_, .bridge = bridge_, .tasks = tasks_, .notes = notes_}),
       learning_(registry_, options_.learn.count()),
       deadlock_watch_({.engine = *engine_, .tasks = tasks_, .notes = notes_}, setup_.config.workers) {
   engine_->share_releases(timer_.thread());
@@ -83,9 +83,13 @@ void ReDAGExecutor::Core::open(ExecutorHooks hooks, const std::vector<const rclc
   hooks_ = std::move(hooks);
   registry_.open(shared_from_this(), hooks_.groups);
   for (const rclcpp::GuardCondition *condition : conditions) bridge_.watch(*condition);
+  shutdown_ = context_->add_on_shutdown_callback([weak = weak_from_this()] {
+    if (const auto core = weak.lock()) core->start_no_more();
+  });
 }
 
 void ReDAGExecutor::Core::close() {
+  (void)context_->remove_on_shutdown_callback(shutdown_);
   live_.reset();
   timer_.stop();
   engine_->halt();
@@ -141,6 +145,14 @@ redag::runtime::DeviceHandle ReDAGExecutor::Core::device(const std::string &name
 
 void ReDAGExecutor::Core::wait_set_changed() {
   if (waiting_ || direct_) bridge_.wake();
+}
+
+void ReDAGExecutor::Core::look_for_leftovers(const std::shared_ptr<Callback> &callback) {
+  try {
+    find_leftovers(context_, {callback});
+  } catch (const rclcpp::exceptions::RCLError &) {
+    // The context was shut down.
+  }
 }
 
 void ReDAGExecutor::Core::rate_seen() {
@@ -272,8 +284,9 @@ void ReDAGExecutor::Core::keep_house(MiddlewareWatch *middleware) {
     learning_.look(now);
     if (now >= report_unmatched_at_) report_unmatched();
     deadlock_watch_.look();
-    const redag::Time next = std::min({report_unmatched_at_, deadlock_watch_.next_look(), learning_.next_look(),
-                                       middleware == nullptr ? kNever : middleware->next_look()});
+    const redag::Time next =
+        std::min({registry_.look_at_edges(now), report_unmatched_at_, deadlock_watch_.next_look(),
+                  learning_.next_look(), middleware == nullptr ? kNever : middleware->next_look()});
     if (next == kNever) {
       keeper_parker_.park();
     } else if (next > now) {
@@ -294,15 +307,18 @@ void ReDAGExecutor::Core::watch_wait_set() noexcept {
     // One cause is a context that was shut down while the wait set was filled.
     wait_set_failure_ = std::current_exception();
   }
-  timer_.pause();
-  engine_->pause();
+  start_no_more();
   wait_set_done_ = true;
   keeper_parker_.unpark();
 }
 
-void ReDAGExecutor::Core::stop_workers() {
+void ReDAGExecutor::Core::start_no_more() {
   timer_.pause();
   engine_->pause();
+}
+
+void ReDAGExecutor::Core::stop_workers() {
+  start_no_more();
   engine_->end_started();
   direct_ = false;
   deadlock_watch_.jobs_ended();

@@ -40,7 +40,7 @@ namespace redag_rclcpp {
 struct ExecutorHooks {
   Registry::Groups groups;         // all groups that are to be executed
   std::function<bool()> may_spin;  // false: cancelled or shut down
-  std::function<void()> stop;      // as rclcpp's cancel()
+  std::function<void()> stop;      // cancel()
 };
 
 class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_shared_from_this<Core> {
@@ -61,6 +61,9 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
     FirstSpin expected = FirstSpin::Awaited;
     first_spin_.compare_exchange_strong(expected, FirstSpin::Cancelled);
   }
+
+  /// Starts no further callbacks until the next spin.
+  void start_no_more();
 
   void spin();
   void spin_ready(std::chrono::nanoseconds max_duration, bool exhaustive);
@@ -83,6 +86,7 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
   void wake() override;
   void timers_changed() override;
   void wait_set_changed() override;
+  void look_for_leftovers(const std::shared_ptr<Callback> &callback) override;
   void exchange_arrived() override;
   void entities_changed() override;
   [[nodiscard]] redag::Duration learning_time() const override { return learning_.time(); }
@@ -109,6 +113,7 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
   rclcpp::Context::SharedPtr context_;
   const ReDAGOptions options_;
   ExecutorHooks hooks_;
+  rclcpp::OnShutdownCallbackHandle shutdown_;
   redag::runtime::Setup setup_;
   const redag::Time origin_;  // zero of the engine's clock, on CLOCK_MONOTONIC
   Notes notes_;

@@ -51,7 +51,7 @@ ReDAGExecutor::ReDAGExecutor(const rclcpp::ExecutorOptions &options, ReDAGOption
     return get_all_callback_groups();
   };
   hooks.may_spin = [this] { return rclcpp::ok(context_) && spinning.load(); };
-  hooks.stop = [this] { rclcpp::Executor::cancel(); };
+  hooks.stop = [this] { cancel(); };
   core_->open(std::move(hooks), {compat::address_of(interrupt_guard_condition_), shutdown_guard_condition_.get()});
 }
 
@@ -74,6 +74,7 @@ void ReDAGExecutor::remove_node(distribution::NodePointer node, bool notify) {
   core_->registry().change([&] {
     kept = compat::keep_groups(*this);
     rclcpp::Executor::remove_node(node, notify);
+    compat::release_removed(*this);
     core_->registry().remove_node(node);
   });
 }
@@ -95,6 +96,7 @@ void ReDAGExecutor::add_callback_group(distribution::GroupPointer group, distrib
 void ReDAGExecutor::remove_callback_group(distribution::GroupPointer group, bool notify) {
   core_->registry().change([&] {
     rclcpp::Executor::remove_callback_group(group, notify);
+    compat::release_removed(*this);
     core_->registry().remove_group(group);
   });
 }
@@ -172,6 +174,7 @@ rclcpp::FutureReturnCode ReDAGExecutor::spin_until_future_complete_impl(
 void ReDAGExecutor::cancel() {
   core_->cancel_first_spin();
   rclcpp::Executor::cancel();
+  core_->start_no_more();
 }
 
 // ---- queries ----

@@ -7,11 +7,16 @@
 #include <set>
 #include <utility>
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include "compat.hpp"
+#include "rclcpp/logging.hpp"
 #include "redag/loader/validate.hpp"
 
 namespace redag_rclcpp {
 
+using redag::Duration;
 using redag::Task;
 
 Registry::Registry(rclcpp::Context::SharedPtr context, const ReDAGOptions &options, std::uint32_t workers,
@@ -60,6 +65,10 @@ void Registry::remove_node(const NodeBase::SharedPtr &node) {
   std::erase_if(nodes_, [&](const NodeBase::WeakPtr &weak) { return weak.lock() == node; });
   forget_gone_nodes();
   node->get_notify_guard_condition().set_on_trigger_callback(nullptr);
+  node->for_each_callback_group([&](const rclcpp::CallbackGroup::SharedPtr &group) {
+    collect_lock_.assert_held();
+    if (manual_groups_.count(group) == 0) forget_group(group);
+  });
 }
 
 void Registry::keep_until_done(NodeBase &node, const std::shared_ptr<void> &instance) {
@@ -89,6 +98,7 @@ void Registry::add_group(const rclcpp::CallbackGroup::SharedPtr &group, const No
 void Registry::remove_group(const rclcpp::CallbackGroup::SharedPtr &group) {
   collect_lock_.assert_held();  // see change()
   manual_groups_.erase(group);
+  forget_group(group);
 }
 
 // Forgets nodes that were destroyed without being removed. The counters of their names begin anew with a node of the
@@ -214,6 +224,11 @@ std::string Registry::group_name(const rclcpp::CallbackGroup::SharedPtr &group) 
   return group->type() == rclcpp::CallbackGroupType::MutuallyExclusive ? entry->second : std::string();
 }
 
+// Another executor can have the group next.
+void Registry::forget_group(const rclcpp::CallbackGroup::SharedPtr &group) {
+  if (group_names_.erase(group) > 0) watch_group(*group, nullptr);
+}
+
 void Registry::watch_group(rclcpp::CallbackGroup &group, const std::function<void(std::size_t)> &callback) {
   const auto condition = compat::notify_guard_condition(group, context_);
   if (condition) condition->set_on_trigger_callback(callback);
@@ -311,24 +326,28 @@ const void *Registry::remove(const std::shared_ptr<Callback> &gone) {
 void Registry::find_places(const std::vector<Entity> &found) {
   places_.clear();
   if (!matcher_) return;
-  for (const auto &[place, placed] : placed_) places_.insert(place);
+  for (const auto &[place, placed] : placed_) ++places_[place];
   Counters counters = next_index_;
   for (const Entity &entity : found) {
     if (callbacks_.count(entity.key) != 0 || entity.owner != nullptr) continue;
-    if (const auto ref = matcher_->find(id_of(entity, counters))) places_.emplace(ref->dag.value, ref->index);
+    if (const auto ref = matcher_->find(id_of(entity, counters))) ++places_[{ref->dag.value, ref->index}];
   }
 }
 
+const Task &Registry::task_at(Place place) const { return options_.workload->dags[place.first].tasks[place.second]; }
+
 const std::vector<std::uint32_t> &Registry::predecessors_of(Place place) const {
   static const std::vector<std::uint32_t> none;
-  const redag::Dag &dag = options_.workload->dags[place.first];
-  return dag.edges == redag::Edges::Executed ? dag.tasks[place.second].predecessors : none;
+  const bool executed = options_.workload->dags[place.first].edges == redag::Edges::Executed;
+  return executed ? task_at(place).predecessors : none;
 }
 
+// A task of several callbacks, perhaps of different rates, has no one end to wait for.
 bool Registry::has_predecessor(Place place) const {
   const std::vector<std::uint32_t> &predecessors = predecessors_of(place);
   return std::any_of(predecessors.begin(), predecessors.end(), [&](std::uint32_t p) REDAG_REQUIRES(collect_lock_) {
-    return places_.count({place.first, p}) > 0;
+    const auto callbacks = places_.find({place.first, p});
+    return callbacks != places_.end() && callbacks->second == 1;
   });
 }
 
@@ -344,14 +363,44 @@ std::vector<std::shared_ptr<Callback>> Registry::still_plain() const {
 // Tells the engine which callbacks each callback waits for: those of its predecessors in the workload that are present.
 void Registry::connect() {
   for (const auto &[place, placed] : placed_) {
-    if (!placed.waits) continue;
     std::vector<redag::TaskId> predecessors;
     for (const std::uint32_t p : predecessors_of(place)) {
       const auto [first, last] = placed_.equal_range({place.first, p});
-      for (auto it = first; it != last; ++it) predecessors.push_back(it->second.callback->task());
+      if (const auto callbacks = std::distance(first, last); callbacks == 1) {
+        predecessors.push_back(first->second.callback->task());
+      } else if (callbacks > 1) {
+        warn(fmt::format("{} does not wait for {}, which is {} callbacks: let the workload file name one of them",
+                         name_at(place), name_at({place.first, p}), callbacks));
+      }
     }
-    connect_to(placed.callback->task(), std::move(predecessors));
+    if (placed.waits) connect_to(placed.callback->task(), std::move(predecessors));
   }
+}
+
+redag::Time Registry::look_at_edges(redag::Time now) {
+  constexpr Duration kBetweenLooks = redag::kSecond;
+  constexpr Duration kLongWait = 10;  // periods
+  const redag::LockGuard guard(collect_lock_);
+  if (predecessors_.empty()) return redag::kNever;
+  for (const auto &[place, placed] : placed_) {
+    if (!placed.callback->alive()) stale_ = true;
+    if (!placed.waits) continue;
+    const std::optional<redag::Time> since = placed.callback->waits_since();
+    if (!since || now - *since < std::max(kBetweenLooks, kLongWait * task_at(place).period)) continue;
+    std::vector<std::string> names;
+    for (const std::uint32_t p : predecessors_of(place)) names.push_back(name_at({place.first, p}));
+    warn(fmt::format("{} has a message, and waits for the end of {}, which does not come", name_at(place),
+                     fmt::join(names, " or ")));
+  }
+  return now + kBetweenLooks;
+}
+
+std::string Registry::name_at(Place place) const {
+  return options_.workload->dags[place.first].name + "." + task_at(place).name;
+}
+
+void Registry::warn(std::string text) {
+  if (parts_.notes.warn(text)) RCLCPP_WARN(rclcpp::get_logger("redag_rclcpp"), "%s", text.c_str());
 }
 
 void Registry::connect_to(redag::TaskId task, std::vector<redag::TaskId> predecessors) {

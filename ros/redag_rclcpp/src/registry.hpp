@@ -12,7 +12,6 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -29,6 +28,7 @@
 #include "redag_rclcpp/executor.hpp"
 #include "release_timer.hpp"
 #include "task_table.hpp"
+#include "watch/notes.hpp"
 
 namespace redag_rclcpp {
 
@@ -42,6 +42,7 @@ class Registry {
     ReleaseTimer &timer;
     Bridge &bridge;
     TaskTable &tasks;
+    Notes &notes;
   };
   using Groups = std::function<std::vector<rclcpp::CallbackGroup::WeakPtr>()>;
 
@@ -70,6 +71,10 @@ class Registry {
   /// Returns true if it was stale before.
   bool set_stale() { return stale_.exchange(true); }
 
+  /// Finds callbacks that were destroyed, of which rclcpp does not tell, if others wait for them. Warns of callbacks
+  /// that wait for long. Returns when to look again; kNever: no callback waits for others.
+  redag::Time look_at_edges(redag::Time now);
+
   /// Gives callbacks the rates that were learned. Returns their number.
   std::size_t adopt_rates();
   /// The tasks of the workload that no callback matches, as text.
@@ -89,6 +94,9 @@ class Registry {
   [[nodiscard]] redag::CallbackId id_of(const Entity &found, Counters &counters) const;
   void add(const Entity &found, redag::CallbackId id) REDAG_REQUIRES(collect_lock_);
   void find_places(const std::vector<Entity> &found) REDAG_REQUIRES(collect_lock_);
+  [[nodiscard]] const redag::Task &task_at(Place place) const;
+  [[nodiscard]] std::string name_at(Place place) const;
+  void warn(std::string text);
   [[nodiscard]] const std::vector<std::uint32_t> &predecessors_of(Place place) const;
   [[nodiscard]] bool has_predecessor(Place place) const REDAG_REQUIRES(collect_lock_);
   [[nodiscard]] std::vector<std::shared_ptr<Callback>> still_plain() const REDAG_REQUIRES(collect_lock_);
@@ -101,6 +109,7 @@ class Registry {
   [[nodiscard]] std::vector<Entity> find_all() REDAG_REQUIRES(collect_lock_);
   [[nodiscard]] bool is_called_by_owner(const Entity &entity) const REDAG_REQUIRES(collect_lock_);
   [[nodiscard]] std::string group_name(const rclcpp::CallbackGroup::SharedPtr &group) REDAG_REQUIRES(collect_lock_);
+  void forget_group(const rclcpp::CallbackGroup::SharedPtr &group) REDAG_REQUIRES(collect_lock_);
 
   const rclcpp::Context::SharedPtr context_;
   const ReDAGOptions &options_;
@@ -119,7 +128,7 @@ class Registry {
   std::vector<NodeBase::WeakPtr> nodes_ REDAG_GUARDED_BY(collect_lock_);
   std::map<const void *, std::shared_ptr<Callback>> callbacks_ REDAG_GUARDED_BY(collect_lock_);  // by entity
   std::multimap<Place, Placed> placed_ REDAG_GUARDED_BY(collect_lock_);  // callbacks that the workload names
-  std::set<Place> places_ REDAG_GUARDED_BY(collect_lock_);               // theirs, also of callbacks yet to be added
+  std::map<Place, int> places_ REDAG_GUARDED_BY(collect_lock_);          // how many, with those yet to be added
   std::map<redag::TaskId, std::vector<redag::TaskId>> predecessors_ REDAG_GUARDED_BY(collect_lock_);  // the engine's
   ByGroup<std::string> group_names_ REDAG_GUARDED_BY(collect_lock_);
   ByGroup<NodeBase::WeakPtr> manual_groups_ REDAG_GUARDED_BY(collect_lock_);

@@ -314,6 +314,9 @@ redag::Duration TaskTable::seen_period(const Entry &entry, int depth) const {
     return stated > 0 ? stated : entry.task.period;
   }
   if (is_ros_internal(entry.id)) return 0;  // nodes are loaded in bursts, which tell no rate
+  // Requests and goals come in bursts as well. Only their number within the whole learning time is a rate.
+  const bool is_stream = entry.id.kind == redag::Callback::Kind::Subscription;
+  if (!is_stream && !entry.callback->has_learned()) return 0;
   redag::Duration period = 0;
   double rate = 0;  // per nanosecond, of the publishers together
   for (const TaskId publisher : entry.callback->publishers()) {

@@ -27,6 +27,7 @@
 #include "redag/threads/parker.hpp"
 #include "redag_analysis/metrics/check/trace_checker.hpp"
 #include "spinning.hpp"
+#include "test_msgs/srv/empty.hpp"
 
 namespace redag_rclcpp {
 namespace {
@@ -250,6 +251,59 @@ TEST_P(ExecutorTest, CancelBeforeTheFirstSpinIsNotLost) {
   });
   executor.spin();
   EXPECT_GE(count, 3);
+}
+
+// As with rclcpp's executors: what a callback closes after these calls, no other callback uses.
+TEST_P(ExecutorTest, NoCallbackStartsAfterOneHasCancelledOrShutDown) {
+  for (const bool shuts_down : {false, true}) {
+    SCOPED_TRACE(shuts_down);
+    ReDAGExecutor executor(options);
+    auto out = publisher("/x");
+    std::atomic<int> calls{0};
+    auto subscription = subscribe("/x", [&] {
+      ++calls;
+      shuts_down ? static_cast<void>(rclcpp::shutdown()) : executor.cancel();
+      std::this_thread::sleep_for(5ms);  // time for others to begin
+    });
+    executor.add_node(node);
+    for (int i = 0; i < 10; ++i) out->publish(Empty());
+    executor.spin();
+    EXPECT_EQ(calls, 1);
+    executor.remove_node(node);
+  }
+}
+
+TEST_P(ExecutorTest, ANodeRemovedWhileSpinningCanJoinAnyOtherExecutor) {
+  auto timer = node->create_wall_timer(1ms, [] {});
+  ReDAGExecutor executor(options);
+  executor.add_node(node);
+  const Spinner spinner(executor);
+  executor.remove_node(node);
+  ReDAGExecutor second(options);
+  second.add_node(node);
+  second.remove_node(node);
+  rclcpp::executors::SingleThreadedExecutor third;
+  third.add_node(node);
+  third.spin_some();
+  third.remove_node(node);
+}
+
+TEST_P(ExecutorTest, AGroupThatMovesBetweenExecutorsIsServed) {
+  auto group = node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive, false);
+  ReDAGExecutor a(options);
+  for (int round = 0; round < 2; ++round) {
+    a.add_callback_group(group, node->get_node_base_interface());
+    a.remove_callback_group(group);
+    ReDAGExecutor b(options);
+    b.add_callback_group(group, node->get_node_base_interface());
+    b.remove_callback_group(group);
+  }
+  a.add_callback_group(group, node->get_node_base_interface());
+  const Spinner spinner(a);
+  std::atomic<int> calls{0};
+  auto timer = node->create_wall_timer(
+      1ms, [&] { ++calls; }, group);
+  EXPECT_TRUE(eventually([&] { return calls >= 3; })) << "an entity that was created later";
 }
 
 // The first spin also collects the entities, which can take longer than a short limit.
@@ -515,6 +569,26 @@ TEST_P(ExecutorTest, LearnsFromTheThirdMessageOnWheneverItComes) {
   std::int64_t before = 0;
   ASSERT_EQ(rcl_timer_exchange_period(timer->get_timer_handle().get(), 10'000'000, &before), RCL_RET_OK);
   EXPECT_TRUE(eventually([&] { return period_of("", redag::Callback::Kind::Timer) == 10'000'000; }));
+}
+
+// Requests come in bursts, which would make a long service more urgent than a control loop.
+TEST_P(ExecutorTest, ABurstOfRequestsIsNoRate) {
+  options.learn = 1h;
+  ReDAGExecutor executor(options);
+  std::atomic<int> served{0};
+  auto service = node->create_service<test_msgs::srv::Empty>(
+      "/plan",
+      [&](test_msgs::srv::Empty::Request::ConstSharedPtr, test_msgs::srv::Empty::Response::SharedPtr) { ++served; });
+  auto client = node->create_client<test_msgs::srv::Empty>("/plan");
+  executor.add_node(node);
+  const Spinner spinner(executor);
+  ASSERT_TRUE(client->wait_for_service(kLimit));
+  for (int i = 0; i < 6; ++i) client->async_send_request(std::make_shared<test_msgs::srv::Empty::Request>());
+  ASSERT_TRUE(eventually([&] { return served == 6; }));
+  std::this_thread::sleep_for(20ms);
+  for (const CallbackStats &stats : executor.stats()) {
+    if (stats.id.kind == redag::Callback::Kind::Service) EXPECT_EQ(stats.period, options.default_period.count());
+  }
 }
 
 // If another process subscribes as well (a recorder, rviz), the middleware brings every message a second time. rclcpp

@@ -98,6 +98,24 @@ TEST(Bounds, TheGroupsAreThoseOfRos) {
   EXPECT_EQ(bounds.tasks().at("control.fast").response, 3 * kMillisecond - 1) << "it can find the group taken";
 }
 
+TEST(Bounds, ATimerWithPredecessorsWaitsForThemWhereEdgesAreExecuted) {
+  redag::Workload workload = parse(kTwoTimers);
+  workload.dags[0].tasks[1].predecessors = {0};
+  const std::vector<CallbackStats> stats{stats_of("control.fast", 10 * kMillisecond, 0),
+                                         stats_of("control.slow", 20 * kMillisecond, 1)};
+  const auto bound_of_slow = [&] {
+    Bounds bounds(workload);
+    EXPECT_TRUE(bounds.update(stats, one_worker(), [&] { return workload; }));
+    const auto found = bounds.tasks().find("control.slow");
+    return found == bounds.tasks().end() ? redag::kNever : found->second.response;
+  };
+  workload.dags[0].edges = redag::Edges::Seen;
+  EXPECT_EQ(bound_of_slow(), 3 * kMillisecond);
+  // Its predecessor can end just after the timer's last job began, and then once more a period later.
+  workload.dags[0].edges = redag::Edges::Executed;
+  EXPECT_GE(bound_of_slow(), 12 * kMillisecond);
+}
+
 TEST(Bounds, AreAnalysedAnewOnlyForOtherCallbacks) {
   const redag::Workload workload = parse(kTwoTimers);
   int asked = 0;

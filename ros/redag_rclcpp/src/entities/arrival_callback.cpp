@@ -65,6 +65,7 @@ void ArrivalCallback::arrived(std::size_t count, Source source, int part, bool s
     if (learn_from_arrival(now, count, source, publisher)) to_adopt = context();
     const Time origin = origin_of(now, publisher);
     const bool direct = context()->direct();
+    if (source == Source::IntraProcess) in_process_ = true;
     if (depth_ > 0) count = std::min(count, depth_);
     bool replaces = false;
     for (std::size_t i = 0; i < count; ++i) {
@@ -246,20 +247,39 @@ bool ArrivalCallback::take_token(Token &token) {
   return true;
 }
 
-// The newest token that had come when the job was released. Its message may have been overwritten since: then the first
-// one after it.
-bool ArrivalCallback::take_token_of(Time release, Token &token) {
+// The newest token that had come when the job was released; with `or_later`, else the first one after it. Passes over
+// the older ones of its source, which hands out its messages in their order.
+bool ArrivalCallback::take_newest(Time release, bool or_later, Token &token) {
   const redag::LockGuard guard(lock_);
-  if (tokens_.empty()) return false;
-  while (tokens_.size() > 1 && tokens_.at(1).arrival <= release) {
-    const Token &older = tokens_.front();
-    ++dropped_[index_of(older.source)];
-    tokens_.pop();
+  if (tokens_.empty() || (tokens_.front().arrival > release && !or_later)) return false;
+  std::size_t newest = 0;
+  while (newest + 1 < tokens_.size() && tokens_.at(newest + 1).arrival <= release) ++newest;
+  token = tokens_.at(newest);
+  tokens_.erase(newest);
+  for (std::size_t i = newest; i-- > 0;) {
+    if (tokens_.at(i).source == token.source) pass_over(i);
   }
-  token = tokens_.pop();
   const std::size_t at = index_of(token.source);
   dropping_[at] += std::exchange(dropped_[at], 0);
   token.after_skipped = dropping_[at] > 0;
+  return true;
+}
+
+// The message of that token will be dropped before the next one of its source is taken.
+void ArrivalCallback::pass_over(std::size_t position) {
+  ++dropped_[index_of(tokens_.at(position).source)];
+  tokens_.erase(position);
+}
+
+// A job of a joined callback.
+bool ArrivalCallback::run_newest(Time release) {
+  Token token;
+  bool or_later = true;  // the message of the release may have been overwritten
+  do {
+    if (!take_newest(release, std::exchange(or_later, false), token)) return false;
+  } while (!execute_token(token));
+  const redag::LockGuard guard(lock_);
+  while (!tokens_.empty() && tokens_.front().arrival < token.arrival) pass_over(0);  // of the other source
   return true;
 }
 
@@ -312,6 +332,15 @@ std::vector<KeptInput> ArrivalCallback::kept() const {
     kept.push_back({.arrived = tokens_.at(i).arrival, .sender = tokens_.at(i).sender});
   }
   return kept;
+}
+
+std::optional<Time> ArrivalCallback::waits_since() const {
+  const redag::LockGuard guard(lock_);
+  for (std::size_t i = 0; joined_ && i < tokens_.size(); ++i) {
+    const Token &token = tokens_.at(i);
+    if (token.source == Source::IntraProcess || !in_process_) return token.arrival;
+  }
+  return std::nullopt;
 }
 
 Duration ArrivalCallback::mean_interval() const {
@@ -380,9 +409,9 @@ void ArrivalCallback::Taking::count(bool taken) {
 }
 
 bool ArrivalCallback::run(Time release) {
+  if (joined_) return run_newest(release);
   Token token;
-  const bool found = joined_ ? take_token_of(release, token) : take_token(token);
-  return found && execute_token(token);
+  return take_token(token) && execute_token(token);
 }
 
 bool ArrivalCallback::execute_token(const Token &token) {
@@ -406,6 +435,7 @@ bool ArrivalCallback::execute_token(const Token &token) {
   if (token.after_skipped) drop_skipped(token.source);
   const bool taken = handle(token, taking);
   bool more = false;
+  std::shared_ptr<ExecutorContext> to_look;
   // This job has lowered kept_ and now reads leftovers_. release_leftovers() sets leftovers_ and then reads kept_. At
   // least one of them sees what the other wrote.
   if (leftovers_[index_of(token.source)]) {
@@ -413,8 +443,15 @@ bool ArrivalCallback::execute_token(const Token &token) {
     std::atomic<bool> &leftovers = leftovers_[index_of(token.source)];
     leftovers = leftovers && taken;
     more = leftovers && kept_[index_of(token.source)] == 0;
+    if (more && joined_) {
+      // A token without a message would wait for the next round, and then cost the message that comes in it.
+      more = false;
+      leftovers = false;
+      to_look = context();
+    }
   }
   if (more) arrived(1, token.source, 0);
+  if (to_look) to_look->look_for_leftovers(shared_from_this());
   return taken;
 }
 

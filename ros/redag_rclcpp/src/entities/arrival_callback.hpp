@@ -9,6 +9,8 @@
 //
 // A joined callback also waits for other callbacks. Then the scheduler releases the job once all of them have completed
 // and a message is there, and the job takes the newest message that was there at its release. Older ones are dropped.
+// Beside intra-process communication, the middleware can bring a message a second time. rclcpp does not take this copy,
+// and the job goes on to the newest message of its process.
 //
 // Threads: the middleware's threads and publishing threads call the hooks, with their own locks held. An arrival
 // and a job each take lock_ once, and the engine's lock once. Lock order: the callers' locks, lock_, the timer queue's,
@@ -18,6 +20,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -37,6 +40,7 @@ class ArrivalCallback : public Callback, public Hooked {
   [[nodiscard]] Duration mean_interval() const override;
   [[nodiscard]] bool has_learned() const override;
   [[nodiscard]] std::vector<KeptInput> kept() const override;
+  [[nodiscard]] std::optional<Time> waits_since() const override;
   [[nodiscard]] std::shared_ptr<void> hold() override { return entity(); }
 
   void arrived_in_middleware(std::size_t count) noexcept override { arrived(count, Source::Middleware, 0); }
@@ -151,7 +155,9 @@ class ArrivalCallback : public Callback, public Hooked {
   [[nodiscard]] bool learn_from_arrival(Time now, std::size_t count, Source source,
                                         const redag::runtime::RunningJob *publisher) REDAG_REQUIRES(lock_);
   [[nodiscard]] bool take_token(Token &token);
-  [[nodiscard]] bool take_token_of(Time release, Token &token);
+  [[nodiscard]] bool run_newest(Time release);
+  [[nodiscard]] bool take_newest(Time release, bool or_later, Token &token);
+  void pass_over(std::size_t position) REDAG_REQUIRES(lock_);
   [[nodiscard]] bool begin_release(redag::runtime::Release &release) REDAG_REQUIRES(lock_);
   void begin_release_of_first(redag::runtime::Release &release) REDAG_REQUIRES(lock_);
   [[nodiscard]] bool begin_receive(redag::runtime::Release &message) REDAG_REQUIRES(lock_);
@@ -180,8 +186,9 @@ class ArrivalCallback : public Callback, public Hooked {
   std::atomic<bool> leftovers_[2] = {false, false};           // there may be more messages than tokens
   // Jobs in the scheduler, or whose skip it has yet to report. hold_releases() counts as one.
   std::uint32_t released_ REDAG_GUARDED_BY(lock_) = 0;
-  bool noted_ REDAG_GUARDED_BY(lock_) = false;  // noted by note(), not yet admitted
-  bool seen_ REDAG_GUARDED_BY(lock_) = false;   // seen by the wait set, not yet handled
+  bool noted_ REDAG_GUARDED_BY(lock_) = false;       // noted by note(), not yet admitted
+  bool seen_ REDAG_GUARDED_BY(lock_) = false;        // seen by the wait set, not yet handled
+  bool in_process_ REDAG_GUARDED_BY(lock_) = false;  // a message has come from this process: others may be its copies
   std::vector<TaskId> publishers_ REDAG_GUARDED_BY(lock_);
   std::uint64_t arrivals_[2] REDAG_GUARDED_BY(lock_) = {0, 0};
   // Messages from the middleware, counted if intra-process communication delivers messages as well.

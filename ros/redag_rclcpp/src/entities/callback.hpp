@@ -12,6 +12,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -85,6 +86,8 @@ class Callback : public TimerQueue::Timer,
   /// the oldest first.
   [[nodiscard]] virtual Exchange exchange() const { return {}; }
   [[nodiscard]] virtual std::vector<KeptInput> kept() const { return {}; }
+  /// For callbacks that join others: when the oldest message arrived that waits for them.
+  [[nodiscard]] virtual std::optional<Time> waits_since() const { return std::nullopt; }
 
   [[nodiscard]] const redag::CallbackId &id() const { return id_; }
   [[nodiscard]] TaskId task() const { return task_; }

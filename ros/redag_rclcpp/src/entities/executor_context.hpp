@@ -31,6 +31,8 @@ class ExecutorContext {
   virtual void timers_changed() = 0;
   /// Called when a job has handled an arrival that the wait set saw.
   virtual void wait_set_changed() = 0;
+  /// Has the callback told of messages that no hook may have reported. The caller holds no lock of this package.
+  virtual void look_for_leftovers(const std::shared_ptr<Callback> &callback) = 0;
   /// Called when a request or response has arrived. The caller holds no lock of this package.
   virtual void exchange_arrived() = 0;
   /// Called when a node or group may have other entities than before.

@@ -233,7 +233,11 @@ void SubscriptionCallback::drop_skipped(Source source) {
     subscription->return_serialized_message(message);
   } else {
     std::shared_ptr<void> message = subscription->create_message();
-    drop([&] { return subscription->take_type_erased(message.get(), info); });
+    // rclcpp says "nothing taken" of a message that intra-process communication delivers as well.
+    drop([&] {
+      return subscription->take_type_erased(message.get(), info) ||
+             info.get_rmw_message_info().publisher_gid.implementation_identifier != nullptr;
+    });
     subscription->return_message(message);
   }
 }

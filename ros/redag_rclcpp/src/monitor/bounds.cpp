@@ -82,8 +82,8 @@ bool Bounds::as_executed(const std::vector<CallbackStats> &stats, const Workload
         task.group = group_of(learned, name);
       }
       if (!absent_.empty()) return false;
-      // The timer alone releases its callback, whatever predecessors the file states.
-      if (task.activation == redag::Activation::Timer) task.predecessors.clear();
+      // Where edges are not executed, the timer alone releases its callback.
+      if (task.activation == redag::Activation::Timer && dag.edges == redag::Edges::Seen) task.predecessors.clear();
       task.offset = 0;
       task.overrun = redag::Overrun::Skip;
       if (!task.group.empty()) task.concurrency = 1;

@@ -133,8 +133,10 @@ void Monitor::Impl::start() {
 void Monitor::Impl::create_entities() {
   const auto weak = weak_from_this();
   group_ = node_->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive);
-  diagnostics_ = node_->create_publisher<DiagnosticArray>("/diagnostics", 10);
-  metrics_ = node_->create_publisher<String>("~/metrics", rclcpp::QoS(1).transient_local());
+  rclcpp::PublisherOptions options;
+  options.use_intra_process_comm = rclcpp::IntraProcessSetting::Disable;  // Humble refuses latched topics with it
+  diagnostics_ = node_->create_publisher<DiagnosticArray>("/diagnostics", 10, options);
+  metrics_ = node_->create_publisher<String>("~/metrics", rclcpp::QoS(1).transient_local(), options);
 
   const auto create_service = [&](const char *name, auto callback) {
     return node_->create_service<Trigger>(name, callback, compat::services_qos(), group_);
@@ -281,16 +283,20 @@ void Monitor::Impl::drain() {
     }
   }
   if (!has_bounds_ || events_.empty()) return;
-  const redag::LockGuard guard(bounds_lock_);
-  bounds_->count(
-      events_, [this](redag::TaskId task) { return executor_.task_name(task); },
-      [this](const std::string &name, const TaskBound &bound) {
-        RCLCPP_WARN(node_->get_logger(),
-                    "the response time of %s was %s, which exceeds its bound of %s (%s): an execution time or a rate "
-                    "differs from the workload, or a callback ran that the workload does not contain",
-                    name.c_str(), redag::humanize_duration(bound.worst).c_str(),
-                    redag::format_duration(bound.response).c_str(), bound.method.c_str());
-      });
+  std::vector<std::pair<std::string, TaskBound>> exceeded;  // logged without the lock, which callbacks want
+  {
+    const redag::LockGuard guard(bounds_lock_);
+    bounds_->count(
+        events_, [this](redag::TaskId task) { return executor_.task_name(task); },
+        [&](const std::string &name, const TaskBound &bound) { exceeded.emplace_back(name, bound); });
+  }
+  for (const auto &[name, bound] : exceeded) {
+    RCLCPP_WARN(node_->get_logger(),
+                "the response time of %s was %s, which exceeds its bound of %s (%s): an execution time or a rate "
+                "differs from the workload, or a callback ran that the workload does not contain",
+                name.c_str(), redag::humanize_duration(bound.worst).c_str(),
+                redag::format_duration(bound.response).c_str(), bound.method.c_str());
+  }
 }
 
 void Monitor::Impl::stop_thread() {

@@ -194,6 +194,10 @@ void RaisedMiddleware::look() {
     if (!now.is_realtime() || now.parameters.sched_priority < priority_) {
       const sched_param wanted{priority_};
       if (sched_setscheduler(thread.id, SCHED_FIFO, &wanted) != 0) continue;  // its priority stays in found()
+      if (start_of(thread.id) != start) {  // it ended meanwhile, and its id can be that of another process's thread
+        (void)sched_setscheduler(thread.id, now.policy, &now.parameters);
+        continue;
+      }
       thread.priority = priority_;
       if (known == registry().threads.end()) {
         known = registry().threads.emplace(thread.id, Raised{now, priority_, start, 0}).first;
