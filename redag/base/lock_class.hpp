@@ -14,7 +14,7 @@ namespace redag {
 enum class LockClass : std::uint8_t {
   Undeclared,  // of users, and not checked
   Bounded,     // held for a bounded time: its owner takes no Unbounded lock, and calls no code of users
-  Unbounded,   // its owner may compute, allocate or wait: no thread that must react takes it
+  Unbounded,   // its owner may compute or wait: no thread that must react takes it
 };
 
 #ifdef REDAG_CHECK_LOCK_CLASSES  // the same for the library and all that use it

@@ -31,7 +31,7 @@ constexpr Duration kPatience = 200 * kMicrosecond;
 Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions options)
     : options_(std::move(options)),
       realtime_(os() || options_.realtime_threads),
-      lock_(realtime_, LockClass::Bounded),
+      lock_(realtime_ || options_.waits_priority > 0, LockClass::Bounded),
       scheduler_(std::move(scheduler)),
       pool_(os() ? options_.config.max_started : options_.config.workers + options_.spare_threads,
             options_.trace_capacity),
@@ -220,7 +220,7 @@ void Engine::report(Locked &locked, std::span<const JobEvent> events) {
     if (event.kind != JobEventKind::Skipped) continue;
     if (options_.misses != nullptr &&
         options_.misses->note({event.time, 0, event.task, event.job, MissKind::Skipped, event.reason})) {
-      locked.wake_ups().wake_helper(options_.misses->parker());
+      locked.wake_ups().wake_late(options_.misses->parker());
     }
     if (!has_listeners) continue;
     const auto &listener = tasks_[event.task].listener;
@@ -361,7 +361,8 @@ bool Engine::run_one() {
 // ---- the end ----
 
 // The first thread to take the lock after halt() skips the jobs that have not started. These skips are the engine's,
-// not the model's: they are not recorded, and the jobs count as in flight. Jobs that wait are woken.
+// not the model's: they are not recorded, and the jobs count as in flight. Jobs that wait are woken. halt() takes no
+// lock, so each thread asks once, when it has taken the lock: no event is undecided then, and no job is half woken.
 void Engine::withdraw(Locked &locked) {
   halted_at_ = now();
   scheduler_->close(halted_at_);

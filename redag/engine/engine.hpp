@@ -292,7 +292,7 @@ class Engine {
   std::optional<Time> suspend(Taker &taker, RunningJob &running);
   Time wake_sleepers();
   void end_service(DeviceThread &thread, JobSlot job);
-  void wake(Locked &locked, JobSlot job, Time at) REDAG_REQUIRES(lock_);
+  void wake(JobSlot job, Time at) REDAG_REQUIRES(lock_);
   detail::Wait *wake_own(detail::Wait *waits);
   void wake_cancelled(Locked &locked, Time at) REDAG_REQUIRES(lock_);
   Time finish(Taker &taker, RunningJob &running, sched::Outcome outcome, Body &doomed);

@@ -183,7 +183,7 @@ inline Outcome Engine::call(const Assignment &assignment, RunningJob &running) {
 void Engine::note_misses(Locked &locked, const Job &job, const TaskEntry &entry, Time at, Outcome outcome) {
   const auto note = [&](MissKind kind, Reason reason, Duration lateness) {
     if (options_.misses->note({at, lateness, job.task, job.number, kind, reason})) {
-      locked.wake_ups().wake_helper(options_.misses->parker());
+      locked.wake_ups().wake_late(options_.misses->parker());
     }
   };
   if (outcome == Outcome::NoData) return;

@@ -38,7 +38,7 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
   Locked(const Locked &) = delete;
   Locked &operator=(const Locked &) = delete;
 
-  /// Allocates only if one decision skips more than kFewSkips jobs (HI mode begins).
+  /// Allocates only if one decision skips more than kFewSkips jobs (HI mode begins or ends, a DAG goes).
   void tell(std::shared_ptr<SkipListener> listener, Reason reason) {
     if (!has_skips_) begin_skips();
     if (skips_.count < kFewSkips) {

@@ -123,8 +123,9 @@ void Engine::take_worker(RunningJob &running) {
   const Time at = now();
   {
     Locked locked(*this);
+    withdraw_if_halting(locked);
     self.used += used;
-    wake(locked, running.slot, at);
+    wake(running.slot, at);
     decide(locked, at);
   }
   self.wait_for_worker();
@@ -135,8 +136,7 @@ void Engine::take_worker(RunningJob &running) {
   running.enter();
 }
 
-void Engine::wake(Locked &locked, JobSlot job, Time at) {
-  withdraw_if_halting(locked);
+void Engine::wake(JobSlot job, Time at) {
   waiting_.end(job, at);
   scheduler_->wake(job, at);
 }
@@ -153,12 +153,13 @@ detail::Wait *Engine::wake_own(detail::Wait *waits) {
   std::shared_ptr<InProgress> wakes;
   {
     Locked locked(*this);
+    withdraw_if_halting(locked);
     wakes = wakes_;
     wakes->begin();
     while (waits != nullptr) {
       detail::Wait *const next = waits->next;
       if (waits->engine == this) {
-        wake(locked, waits->job, at);
+        wake(waits->job, at);
       } else {
         waits->next = std::exchange(others, waits);
       }
@@ -179,7 +180,7 @@ Time Engine::wake_sleepers() {
   while (waiting_.next_alarm() <= due) {
     const JobSlot job = waiting_.take_sleeper();
     if (!job.valid()) continue;
-    wake(locked, job, at);
+    wake(job, at);
     woken = true;
   }
   if (woken) decide(locked, at);
@@ -189,8 +190,9 @@ Time Engine::wake_sleepers() {
 void Engine::end_service(DeviceThread &thread, JobSlot job) {
   const Time at = now();
   Locked locked(*this);
+  withdraw_if_halting(locked);
   waiting_.end_service(thread, at);
-  wake(locked, job, at);
+  wake(job, at);
   decide(locked, at);
 }
 
@@ -198,6 +200,7 @@ void Engine::end_started() {
   {
     const Time at = now();
     Locked locked(*this);
+    withdraw_if_halting(locked);
     REDAG_CHECK(paused_, "end_started() is for a paused engine");
     waiting_.cancel_all();
     if (waiting_.has_cancelled()) wake_cancelled(locked, at);
@@ -209,7 +212,7 @@ void Engine::end_started() {
 
 // After the stop a device serves nobody: each job that it would serve next is woken instead.
 void Engine::wake_cancelled(Locked &locked, Time at) {
-  while (waiting_.has_cancelled()) wake(locked, waiting_.take_cancelled(), at);
+  while (waiting_.has_cancelled()) wake(waiting_.take_cancelled(), at);
   decide(locked, at);
 }
 

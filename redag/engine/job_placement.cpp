@@ -203,10 +203,13 @@ bool JobPlacement::change_several_levels(const sched::Step &step) {
   return true;
 }
 
-// Returns the thread that has the job. Null: the job waits, and is told its level when it goes on, or it runs at the
-// priority of the thread that called run_one().
+// Returns the thread that has the job. Null: the job waits, for example for a device, which will serve it at this
+// level, or it runs at the priority of the thread that called run_one().
 WorkerThread *JobPlacement::set_level(const Dispatch &dispatch) {
-  if (waiting_.find(dispatch.job) != nullptr) return nullptr;
+  if (WaitingJob *const waiting = waiting_.find(dispatch.job)) {
+    waiting->level = dispatch.level;
+    return nullptr;
+  }
   const auto runs_it = [&](const WorkerThread &t) { return !t.stack.empty() && t.stack.back().slot == dispatch.job; };
   if (runs_it(pool_.caller())) return nullptr;
   const auto thread = std::find_if(pool_.threads().begin(), pool_.threads().end(),

@@ -43,15 +43,22 @@ class WakeUps {
     any_ = true;
     helper.unpark();
   }
+  /// Wakes the thread that runs users' functions after the lock: it could preempt the lock's owner. There is only one.
+  void wake_late(Parker &reporter) {
+    any_ = true;
+    reporter_ = &reporter;
+  }
   /// Wakes those that could wait for the end of the lock. Call it once.
   void wake_late() {
     for (std::size_t i = 0; i < count_; ++i) late_[i]->parker.unpark();
+    if (reporter_ != nullptr) reporter_->unpark();
   }
   [[nodiscard]] bool any() const { return any_; }
 
  private:
   bool at_once_;
   bool any_ = false;
+  Parker *reporter_ = nullptr;
   std::array<WorkerThread *, 32> late_;
   std::size_t count_ = 0;
 };

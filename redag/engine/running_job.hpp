@@ -63,7 +63,7 @@ struct RunningJob {
   bool begins_coroutine = false;    // the body is in the first stretch of a coroutine
   CoroutineOwner *owner = nullptr;  // set by the body where it has one: of a coroutine that it may begin
   // Set by close():
-  Time ended = kNever;    // on the engine's clock; kNever: close() has not been called
+  Time ended = kNever;    // on the engine's clock; kNever: the last stretch goes on
   Duration charged = 0;   // processor time of the whole job
   bool on_trust = false;  // `charged` counts the time that the last stretch took on the clock
 

@@ -57,7 +57,7 @@ struct alignas(64) WorkerThread {
   Atomic<bool> goes_on{false};  // its job, which has blocked or yielded, has a worker again; written under the lock
   bool yields = false;          // lock: a job on another thread has preempted its job
   bool led = false;             // used by the thread only: the release thread leaves releases to it
-  bool is_handed = false;       // lock: is in JobPlacement::handed_
+  bool is_handed = false;       // lock: is in Mailboxes::handed_
   bool looks_soon = false;      // lock: its job is expected to end soon, and it looks for others' mail afterwards
   // lock: a number if its mail did not wake it, and 0 otherwise. Larger numbers are later.
   std::uint64_t silent = 0;

@@ -15,7 +15,7 @@ namespace redag {
 
 class AsyncEvent {
  public:
-  /// Allocates. No job may wait for an event that is destroyed.
+  /// Allocates. No job may wait for an event that is destroyed, and every set() of it must have returned.
   AsyncEvent();
   ~AsyncEvent();
   AsyncEvent(const AsyncEvent &) = delete;

@@ -49,6 +49,42 @@ TEST_P(DeviceInEveryMode, AServiceHasThePriorityOfItsJob) {
   EXPECT_EQ(of_service, of_job);
 }
 
+// A job queues for the device, and holds a group that a more urgent job comes to wait for meanwhile.
+TEST_P(DeviceInEveryMode, AServiceHasThePriorityThatItsJobInherits) {
+  Executor executor(one_worker_and_gpu(mode()));
+  const DeviceHandle gpu = executor.device("gpu");
+  std::atomic<bool> is_served{false};
+  std::atomic<bool> may_end{false};
+  std::atomic<int> of_service{-1};
+  std::atomic<int> of_urgent{-2};
+  DagBuilder dag("dag");
+  const EventHandle first = dag.event("first", 3s, [&]() -> Coroutine {
+    co_await gpu.run([&] {
+      is_served = true;
+      while (!may_end) std::this_thread::sleep_for(100us);
+    });
+  });
+  const EventHandle low = dag.event(
+      "low", 2s, [&]() -> Coroutine { co_await gpu.run([&] { of_service = fifo_priority(::pthread_self()); }); },
+      {.group = "g"});
+  const EventHandle urgent = dag.event("urgent", 1s,
+                                       [&] {
+                                         of_urgent = fifo_priority(::pthread_self());
+                                         executor.stop();
+                                       },
+                                       {.group = "g"});
+  executor.add(std::move(dag));
+  executor.start();
+  executor.release(first);
+  while (!is_served) std::this_thread::sleep_for(100us);
+  executor.release(low);
+  std::this_thread::sleep_for(20ms);  // time to queue; else it inherits earlier
+  executor.release(urgent);
+  may_end = true;
+  executor.wait();
+  EXPECT_EQ(of_service, of_urgent);
+}
+
 TEST_P(DeviceInEveryMode, ADeviceServesOneJobInEachSlot) {
   ExecutorOptions options = one_worker_and_gpu(mode());
   options.devices[0].slots = 2;

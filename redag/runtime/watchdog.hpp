@@ -3,7 +3,7 @@
 
 // Reports overdue jobs while they still run: a thread looks at an engine's jobs at an interval. With it, `on_budget`
 // (except abort) and HI mode need no preemption points; they take effect up to one interval late (Engine::watch). Owns
-// its thread. Start the engine before it, and join the engine after it.
+// its thread. Before the engine starts it sees no job. Join the engine after it.
 #pragma once
 
 #include <functional>
@@ -49,8 +49,7 @@ class Watchdog {
   ThreadHandle thread_;
 };
 
-/// For example "in progress for 10.02 s, 9.98 s of processor time". Adds ": it waits, or more urgent jobs leave it no
-/// processor" if the job used little.
+/// For example "in progress for 10.02 s, with 9.98 s of processor time". If the job used little, says what may keep it.
 [[nodiscard]] std::string describe(const OverdueJob &job);
 
 }  // namespace redag::runtime

@@ -5,8 +5,9 @@
 // bounds, exclusive groups, and preemption. docs/model.md defines the semantics. A value without thread, clock or I/O.
 // Not thread-safe.
 //
-// A decision costs O(1) under static policies and O(log n) under edf and fifo. It costs O(m) more if it must find the
-// least urgent running job anew: the one known before has ended, lost its worker, or changed its priority.
+// A decision costs O(log n) under edf and fifo, and O(1) under static policies while no tier holds many jobs. It costs
+// O(m) more if it must find the least urgent running job anew: the one known before has ended, lost its worker, or
+// changed its priority.
 #pragma once
 
 #include <array>

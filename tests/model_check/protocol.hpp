@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "redag/base/lock_class.hpp"
 #include "redag/engine/engine.hpp"
 #include "redag/engine/preemption_point.hpp"
 #include "redag/engine/running_job.hpp"
@@ -37,9 +38,15 @@ namespace explored = testing::explored;
 inline Exploration expect_holds(const std::function<void()> &scenario, ExploreOptions options = {}) {
   if (const char *most = std::getenv("REDAG_EXPLORE")) options.max_executions = std::strtoull(most, nullptr, 10);
   const testing::ThreadState running_job{
-      [] { return static_cast<void *>(runtime::RunningJob::current()); },
-      [](void *job) { runtime::RunningJob::set_current(static_cast<runtime::RunningJob *>(job)); }};
-  Exploration all = testing::explore(scenario, options, running_job);
+      [] { return reinterpret_cast<std::uintptr_t>(runtime::RunningJob::current()); },
+      [](std::uintptr_t job) { runtime::RunningJob::set_current(reinterpret_cast<runtime::RunningJob *>(job)); }};
+  const testing::ThreadState bounded_locks{
+      [] { return std::uintptr_t{detail::bounded_locks}; },
+      [](std::uintptr_t count) { detail::bounded_locks = static_cast<std::uint32_t>(count); }};
+  const testing::ThreadState must_react{
+      [] { return std::uintptr_t{detail::must_react}; },
+      [](std::uintptr_t count) { detail::must_react = static_cast<std::uint32_t>(count); }};
+  Exploration all = testing::explore(scenario, options, {running_job, bounded_locks, must_react});
   const auto *test = ::testing::UnitTest::GetInstance()->current_test_info();
   std::printf(
       "[  STATES  ] %s.%s: %llu executions (+ %llu cut short), %llu transitions, up to %u in one, %u threads%s\n",

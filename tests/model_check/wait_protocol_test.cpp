@@ -3,6 +3,7 @@
 
 // Explores every interleaving of jobs that wait: an event that is set while the job leaves its thread, and a halt that
 // ends the wait meanwhile.
+#include <array>
 #include <vector>
 
 #include "protocol.hpp"
@@ -14,11 +15,12 @@ namespace {
 
 using explored::spawn;
 
-/// An engine with one task, whose jobs run the coroutine that `make` returns.
+/// An engine with one worker, whose jobs run the coroutine that `make` returns.
 class WaitingMachine {
  public:
-  WaitingMachine(Preemption preemption, std::function<Coroutine()> make) : make_(std::move(make)) {
-    const Workload workload = ladder(1);
+  WaitingMachine(Preemption preemption, std::function<Coroutine()> make, std::size_t tasks = 1)
+      : make_(std::move(make)) {
+    const Workload workload = ladder(tasks);
     runtime::EngineOptions options;
     options.config.workers = 1;
     options.config.preemption = preemption;
@@ -29,7 +31,7 @@ class WaitingMachine {
       options.band = runtime::PriorityBand{8, 9};
     }
     engine = std::make_unique<Engine>(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
-    engine->bind(workload, {runtime::coroutine_body([this](const Job &) { return make_(); })});
+    engine->bind(workload, std::vector(tasks, runtime::coroutine_body([this](const Job &) { return make_(); })));
   }
   void start_calmly() {
     explored::calm(true);
@@ -89,6 +91,48 @@ TEST_P(WaitProtocol, AHaltEndsTheWaitThatAnEventMayEnd) {
     }
     explored::join(setter);
   });
+}
+
+// The halt comes between the wake-ups of one set_all(), or before, or after.
+TEST(HaltProtocol, AHaltEndsTheWaitsThatOneCallEnds) {
+  expect_holds([] {
+    std::array<AsyncEvent, 2> events;
+    std::size_t next = 0;
+    WaitingMachine machine(
+        Preemption::None, [&]() -> Coroutine { co_await events[next++]; }, 2);
+    machine.start_calmly();
+    explored::calm(true);
+    machine.engine->release(TaskId(0), 0);
+    machine.engine->release(TaskId(1), 0);
+    explored::settle();
+    explored::calm(false);
+    const std::uint32_t setter = spawn([&] {
+      AsyncEvent::set_all(std::array<AsyncEvent *, 2>{&events[0], &events[1]});
+    });
+    machine.engine->halt();
+    machine.engine->join();
+    explored::check(machine.engine->started().empty(), "a job still waits");
+    explored::join(setter);
+  });
+}
+
+// The halt comes while the alarm wakes a sleeper.
+TEST_P(WaitProtocol, AHaltEndsTheWaitThatAnAlarmEnds) {
+  ExploreOptions options;
+  options.time_passes = true;
+  const auto scenario = [] {
+    WaitingMachine machine(GetParam(), [&]() -> Coroutine { co_await sleep_for(std::chrono::nanoseconds(1000)); });
+    machine.start_calmly();
+    explored::calm(true);
+    machine.engine->release(TaskId(0), 0);
+    explored::settle();
+    explored::calm(false);
+    explored::tick(1000);
+    machine.engine->halt();
+    machine.engine->join();
+    explored::check(machine.engine->started().empty(), "a job still waits");
+  };
+  expect_holds(scenario, options);
 }
 
 }  // namespace

@@ -240,8 +240,9 @@ using exploring::explorer;
 using exploring::kClock;
 using exploring::Operation;
 
-Exploration explore(const std::function<void()> &program, const ExploreOptions &options, ThreadState thread_state) {
-  const auto it = std::make_unique<Explorer>(program, options, thread_state);
+Exploration explore(const std::function<void()> &program, const ExploreOptions &options,
+                    std::vector<ThreadState> thread_states) {
+  const auto it = std::make_unique<Explorer>(program, options, std::move(thread_states));
   return it->run();
 }
 

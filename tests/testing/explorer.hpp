@@ -12,6 +12,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace redag::testing {
 
@@ -37,14 +38,14 @@ struct Exploration {
 
 /// Runs `program` from its beginning, each time in another interleaving, until all are tried or one fails. Failures are
 /// a check() that does not hold, a state in which no thread can continue, and a run without end. The program must not
-/// wait in loops, and must be deterministic apart from the interleaving. `thread_state` gives access to a thread_local
-/// pointer of the code, because fibers share it.
+/// wait in loops, and must be deterministic apart from the interleaving. `thread_states` give access to thread_local
+/// values of the code, because fibers share them. Each is 0 at first.
 struct ThreadState {
-  void *(*get)() = nullptr;
-  void (*set)(void *) = nullptr;
+  std::uintptr_t (*get)();
+  void (*set)(std::uintptr_t);
 };
 [[nodiscard]] Exploration explore(const std::function<void()> &program, const ExploreOptions &options = {},
-                                  ThreadState thread_state = {});
+                                  std::vector<ThreadState> thread_states = {});
 
 /// The operations of the explored program. Outside explore() objects can be created, and used without contention.
 namespace explored {

@@ -23,7 +23,7 @@ void Explorer::run_fibers() {
   const EhGlobals eh = *eh_globals();
   swapcontext(&home_, &fibers_[0].context);
   *eh_globals() = eh;
-  if (thread_state_.set != nullptr) thread_state_.set(nullptr);
+  for (const ThreadState &state : thread_states_) state.set(0);
 }
 
 // After a failure the fibers stay where they are: what they own can no longer be destroyed.
@@ -47,9 +47,9 @@ void Explorer::switch_to(std::uint32_t thread) {
   if (thread == current_) return;
   Fiber &from = fibers_[current_];
   Fiber &to = fibers_[thread];
-  if (thread_state_.get != nullptr) {
-    from.thread_state = thread_state_.get();
-    thread_state_.set(to.thread_state);
+  for (std::size_t i = 0; i < thread_states_.size(); ++i) {
+    from.thread_states[i] = thread_states_[i].get();
+    thread_states_[i].set(to.thread_states[i]);
   }
   from.eh = *eh_globals();
   *eh_globals() = to.eh;
@@ -74,7 +74,7 @@ std::uint32_t Explorer::spawn(std::function<void()> body) {
   Fiber &fiber = fibers_[thread];
   if (!fiber.stack) fiber.stack = std::make_unique<char[]>(kStack);
   fiber.body = std::move(body);
-  fiber.thread_state = nullptr;
+  fiber.thread_states.assign(thread_states_.size(), 0);
   fiber.eh = EhGlobals{};
   fiber.clock = thread == 0 ? Clock{} : fibers_[current_].clock;
   fiber.state = State::Local;

@@ -82,7 +82,7 @@ struct Fiber {
   ucontext_t context{};
   std::unique_ptr<char[]> stack;
   std::function<void()> body;
-  void *thread_state = nullptr;
+  std::vector<std::uintptr_t> thread_states;
   EhGlobals eh;
   State state = State::Ended;
   Operation pending;
@@ -112,8 +112,8 @@ struct Node {
 
 class Explorer {
  public:
-  Explorer(const std::function<void()> &program, const ExploreOptions &options, ThreadState thread_state)
-      : program_(program), options_(options), thread_state_(thread_state) {}
+  Explorer(const std::function<void()> &program, const ExploreOptions &options, std::vector<ThreadState> thread_states)
+      : program_(program), options_(options), thread_states_(std::move(thread_states)) {}
 
   Exploration run();
 
@@ -170,7 +170,7 @@ class Explorer {
 
   const std::function<void()> &program_;
   ExploreOptions options_;
-  ThreadState thread_state_;
+  std::vector<ThreadState> thread_states_;
   Exploration result_;
   std::vector<Node> nodes_;
   std::deque<Object> objects_;
