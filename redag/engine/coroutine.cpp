@@ -15,7 +15,7 @@ void Wait::suspend(std::coroutine_handle<> its_coroutine) noexcept {
   REDAG_CHECK(!running->blocks, "a coroutine waits inside a redag::Blocking");
   coroutine = its_coroutine;
   engine = running->engine;
-  job = running->slot;
+  job = running->job.slot;
   cancelled = timed_out = is_over = false;  // it may be awaited again
   exception = nullptr;
   running->wait = this;

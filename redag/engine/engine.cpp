@@ -35,13 +35,14 @@ Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions option
       scheduler_(std::move(scheduler)),
       pool_(os() ? options_.config.max_started : options_.config.workers + options_.spare_threads,
             options_.trace_capacity),
-      tasks_(options_.measure),
+      tasks_(options_.measure, options_.misses != nullptr),
       lookout_(posts_silently() ? std::make_unique<HelperThread>() : nullptr),
       devices_(scheduler_->devices()),
       waiting_(devices_),
       placement_(pool_, waiting_, os(), options_.band, lookout_ ? &lookout_->parker : nullptr,
                  os() ? sched::kNoLimit : options_.spare_threads),
-      decisions_(options_.trace_capacity) {
+      decisions_(options_.trace_capacity),
+      order_({lock_, *scheduler_, tasks_, placement_}, options_.config.policy) {
   const sched::Config &config = options_.config;
   REDAG_CHECK(!os() || config.max_started >= config.workers, "mode os needs at least one thread for every processor");
   REDAG_CHECK(!os() || options_.spins == 0, "spinning threads would keep others off their processors in mode os");
@@ -49,10 +50,7 @@ Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions option
     const JobEventKind counted = options_.measure ? JobEventKind::Preempted : JobEventKind::Skipped;
     scheduler_->record_only({JobEventKind::Skipped, counted});
   }
-  if (os() && !options_.order_folder.empty()) {
-    REDAG_CHECK(options_.band.shared, "the band of a shared order is shared");
-    order_thread_ = std::make_unique<HelperThread>();
-  }
+  REDAG_CHECK(!shares_order() || options_.band.shared, "the band of a shared order is shared");
 }
 
 Engine::~Engine() {
@@ -80,7 +78,7 @@ Result<void> Engine::start() {
   const Time at = now();
   Locked locked(*this);
   withdraw_if_halting(locked);
-  move_releases();
+  if (os()) order_.move_releases(releases_);
   placement_.start(cpus.empty() ? usable.size() : std::min(cpus.size(), usable.size()));
   running_ = true;
   decide(locked, at);
@@ -90,28 +88,20 @@ Result<void> Engine::start() {
 Result<void> Engine::start_threads(const std::vector<int> &cpus) {
   const ThreadSetup setup{options_.name, realtime_ ? options_.band.top_job : 0, cpus, options_.touched_stack};
   Result<void> started = pool_.start(setup, [this](WorkerThread &self) { main(self); });
-  if (started && order_thread_) started = start_order();
+  if (started && shares_order()) {
+    started = order_.start(options_.order_folder, options_.band.top_job, options_.name + "-order");
+  }
   if (started && lookout_) {
-    started = start_helper(*lookout_, "lookout", os() ? options_.band.timer : 0, [this] { look_out(); });
+    const int priority = os() ? options_.band.timer : 0;
+    started = lookout_->start({options_.name + "-lookout", priority, {}}, [this] { look_out(); });
   }
   return started;
 }
 
-Result<void> Engine::start_helper(HelperThread &helper, const char *name, int priority, std::function<void()> main) {
-  Result<ThreadHandle> started = start_thread({options_.name + "-" + name, priority, {}}, std::move(main));
-  if (!started) return tl::unexpected(started.error());
-  helper.handle = *std::move(started);
-  return {};
-}
-
 void Engine::end_threads() {
   pool_.end();
-  for (HelperThread *helper : {order_thread_.get(), lookout_.get()}) {
-    if (helper == nullptr) continue;
-    helper->parker.unpark();
-    if (helper->handle.joinable()) helper->handle.join();
-  }
-  order_page_.reset();
+  order_.end();
+  if (lookout_) lookout_->end();
 }
 
 void Engine::main(WorkerThread &self) noexcept {
@@ -119,7 +109,7 @@ void Engine::main(WorkerThread &self) noexcept {
     // Read before the mail: all mail was posted before this was set.
     const bool ending = pool_.ending();
     if (self.take_mail()) {
-      Taker taker{self, JobSlot(), {Next::Kind::Start, self.mail}};
+      Taker taker{.thread = self, .below = {}, .takes_any = true, .next = {Next::Kind::Start, self.mail}};
       self.meter.pass();
       run(taker, now());
     } else if (ending) {
@@ -184,7 +174,7 @@ void Engine::look_out() noexcept {
     } else {
       lookout_->parker.park();
     }
-    if (pool_.ending()) return;
+    if (lookout_->ending()) return;
     Locked locked(*this);
     again = placement_.look(locked.wake_ups());
   }
@@ -274,7 +264,7 @@ void Engine::receive(const Release &message, Time at) {
   withdraw_if_halting(locked);
   if (halted_at_ != kNever) return;
   const Sender sender = lookout_ ? note_release(at) : nullptr;
-  scheduler_->receive(message.task, job == nullptr ? TaskId() : job->task, message.nominal, at, message.origin);
+  scheduler_->receive(message.task, job == nullptr ? TaskId() : job->job.task, message.nominal, at, message.origin);
   decide_after_release(locked, at, sender);
 }
 
@@ -283,8 +273,9 @@ void Engine::receive(const Release &message, Time at) {
 Sender Engine::note_release(Time at) {
   RunningJob *const job = RunningJob::current();
   if (job == nullptr || job->engine != this || job->below != nullptr) return nullptr;
-  job->released = std::min(job->released, at);
-  const bool soon = job->thread < pool_.size() && tasks_[job->task].releases_at_end();
+  if (!job->has_released) job->released = at;
+  job->has_released = true;
+  const bool soon = job->thread < pool_.size() && tasks_[job->job.task].releases_at_end();
   return soon ? &pool_[job->thread] : nullptr;
 }
 
@@ -343,7 +334,7 @@ void Engine::wake_pause_waiters() {
 }
 
 bool Engine::run_one() {
-  Taker taker{pool_.caller(), JobSlot(), Next()};
+  Taker taker{.thread = pool_.caller(), .below = {}, .takes_any = false};
   {
     const Time at = now();
     Locked locked(*this);
@@ -400,7 +391,7 @@ std::vector<Problem> Engine::problems() const {
     const LockGuard guard(lock_);
     refused = placement_.refused_priorities();
     waits = scheduler_->thread_waits();
-    of_order = order_problem_;
+    of_order = order_.problem();
   }
   std::vector<Problem> problems;
   if (refused > 0) {

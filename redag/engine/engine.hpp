@@ -31,13 +31,13 @@
 #include "redag/engine/job_body.hpp"
 #include "redag/engine/job_placement.hpp"
 #include "redag/engine/miss_log.hpp"
+#include "redag/engine/shared_order.hpp"
 #include "redag/engine/task_table.hpp"
 #include "redag/engine/waiting_jobs.hpp"
 #include "redag/engine/worker_pool.hpp"
-#include "redag/live/order_page.hpp"
 #include "redag/sched/scheduler.hpp"
 #include "redag/threads/clock.hpp"
-#include "redag/threads/common_order.hpp"
+#include "redag/threads/helper_thread.hpp"
 #include "redag/threads/parker.hpp"
 #include "redag/threads/release_thread.hpp"
 #include "redag/threads/setup.hpp"
@@ -262,23 +262,7 @@ class Engine {
   friend struct RunningJob;
   class Locked;
 
-  struct HelperThread {
-    Parker parker;
-    ThreadHandle handle;
-  };
-
   Result<void> start_threads(const std::vector<int> &cpus);
-  Result<void> start_helper(HelperThread &helper, const char *name, int priority, std::function<void()> main);
-  Result<void> start_order();
-  void follow_order() noexcept;
-  Result<void> look_at_order();
-  void map_levels() REDAG_REQUIRES(lock_);
-  void move_releases() REDAG_REQUIRES(lock_);
-  void tasks_changed() REDAG_REQUIRES(lock_) {
-    rates_changed_ = true;
-    map_levels();
-  }
-  void update_statement();
   void end_threads();
   void main(WorkerThread &self) noexcept;
   void idle(WorkerThread &self) noexcept;
@@ -286,7 +270,7 @@ class Engine {
   void follow(WorkerThread &self) noexcept;
   void look_out() noexcept;
   void run(Taker &taker, Time at) noexcept;
-  Time run_next(Taker &taker, RunningJob &running, Time at, Body &doomed) noexcept;
+  Time run_next(Taker &taker, RunningJob &running, Time at) noexcept;
   sched::Outcome call(const Assignment &assignment, RunningJob &running);
   void end_waits();
   std::optional<Time> suspend(Taker &taker, RunningJob &running);
@@ -295,7 +279,9 @@ class Engine {
   void wake(JobSlot job, Time at) REDAG_REQUIRES(lock_);
   detail::Wait *wake_own(detail::Wait *waits);
   void wake_cancelled(Locked &locked, Time at) REDAG_REQUIRES(lock_);
-  Time finish(Taker &taker, RunningJob &running, sched::Outcome outcome, Body &doomed);
+  Time finish(Taker &taker, RunningJob &running, sched::Outcome outcome);
+  void finish_special(Locked &locked, RunningJob &running, TaskEntry &entry, sched::Outcome outcome)
+      REDAG_REQUIRES(lock_);
   void count_late(const Job &job, TaskEntry &entry, Time at) REDAG_REQUIRES(lock_);
   void note_misses(Locked &locked, const Job &job, const TaskEntry &entry, Time at, sched::Outcome outcome)
       REDAG_REQUIRES(lock_);
@@ -329,6 +315,7 @@ class Engine {
   [[nodiscard]] std::uint32_t most_to_start() const REDAG_REQUIRES(lock_) { return may_start() ? sched::kNoLimit : 0; }
 
   [[nodiscard]] bool os() const { return options_.config.preemption == sched::Preemption::Full; }
+  [[nodiscard]] bool shares_order() const { return os() && !options_.order_folder.empty(); }
   [[nodiscard]] bool posts_silently() const {
     return (os() || !options_.realtime_threads) && options_.config.workers > 1;
   }
@@ -353,13 +340,7 @@ class Engine {
   trace::Ring decisions_;  // written under the lock
   EventMerge merge_;       // drain() only
   Event idle_event_;
-  // With `order_folder`. The page and the statement are start()'s, then the thread's.
-  std::unique_ptr<HelperThread> order_thread_;
-  std::unique_ptr<live::OwnOrderPage> order_page_;
-  live::OrderStatement statement_;
-  bool rates_changed_ REDAG_GUARDED_BY(lock_) = true;  // since the statement was made
-  CommonOrder order_ REDAG_GUARDED_BY(lock_);
-  std::string order_problem_ REDAG_GUARDED_BY(lock_);
+  SharedOrder order_;
   ReleaseThread *releases_ = nullptr;
   bool lets_wait_ = false;  // let_wait() has succeeded
   // let_wait(): wakes jobs that sleep.

@@ -28,6 +28,7 @@ void restore(RunningJob &running, WaitingJob &job) {
   running.used_wcet_low = job.used_wcet_low;
   running.used_budget = job.used_budget;
   running.limit = job.entry->next_limit(running);
+  running.measured = job.measured;
   running.reported = job.reported;
   running.begun = job.begun;
   running.before = job.charged;
@@ -46,12 +47,10 @@ const RunningJob *Engine::current_job() const noexcept {
 // first one begins. Not for a thread without a next job.
 void Engine::run(Taker &taker, Time at) noexcept {
   WorkerThread &self = taker.thread;
-  RunningJob running(this, self);
-  Body doomed;  // of a removed task; destroyed without the lock
+  RunningJob running(this, self, taker.next.assignment.job);
   do {
     if (self.led && running.below == nullptr && !taker.next.assignment.expected_short) follow(self);
-    at = run_next(taker, running, at, doomed);
-    if (doomed) doomed = nullptr;
+    at = run_next(taker, running, at);
   } while (taker.next.kind == Next::Kind::Start);
 }
 
@@ -59,31 +58,29 @@ void Engine::run(Taker &taker, Time at) noexcept {
 // that follows another on its thread is charged for the decision between the two, which saves reading clocks. On the
 // clock, it does not take the time for which that decision was delayed, nor the time to ask for the thread's processor
 // time.
-[[gnu::always_inline]] inline Time Engine::run_next(Taker &taker, RunningJob &running, Time at, Body &doomed) noexcept {
+[[gnu::always_inline]] inline Time Engine::run_next(Taker &taker, RunningJob &running, Time at) noexcept {
   WorkerThread &self = taker.thread;
   const Assignment &assignment = taker.next.assignment;
   const Job &job = assignment.job;
   const trace::Tap *const tap = trace::tap();
   const bool is_traced = options_.trace_capacity > 0;
+  const bool is_told = is_traced || tap != nullptr;
   const auto tell = [&](JobEventKind kind, Time time, std::int64_t value) {
     const JobEvent event{time, value, job.task, job.number, job.worker.value, kind, Reason::None, 0};
     if (is_traced) self.events.push(event);
     if (tap != nullptr) tap->event(this, event);
   };
-  if ((is_traced || tap != nullptr) && assignment.woken == nullptr) {
+  if (is_told && assignment.woken == nullptr) {
     const Time begun = now();
     tell(JobEventKind::Started, begun, begun);
   }
-  running.task = job.task;
-  running.slot = job.slot;
-  running.origin = job.origin;
   running.limit = assignment.entry->first_limit;
-  running.measured = assignment.measured;
+  running.measured = assignment.entry->always_measured;
   running.used_wcet_low = running.used_budget = running.reported = running.cancelled = false;
+  running.blocks = running.begins_coroutine = running.has_released = running.closed = false;
   running.before = running.earlier = 0;
   running.waiting = nullptr;
   running.wait = nullptr;
-  running.ended = running.released = kNever;
   if (self.meter.needs_reading(at, !assignment.expected_short)) {
     self.meter.set(thread_cpu_now(), at);
     at = now();
@@ -94,20 +91,20 @@ void Engine::run(Taker &taker, Time at) noexcept {
   RunningJob::set_current(&running);
   running.enter();
   Outcome outcome = call(assignment, running);
-  if (running.ended == kNever) running.end();
+  if (!running.closed) running.end();
   RunningJob::set_current(running.below);
-  if (running.start.exact && !running.on_trust) {
-    self.meter.set(running.start.cpu + running.charged - running.before, running.ended);
-  } else {
+  if (running.on_trust || !running.start.exact) {
     self.meter.pass();
+  } else {
+    self.meter.set(running.start.cpu + running.charged - running.before, running.ended);
   }
   if (running.wait != nullptr) {
     if (const std::optional<Time> next = suspend(taker, running)) return *next;
     outcome = Outcome::BudgetExceeded;
   }
   if (running.waiting != nullptr) delete std::exchange(running.waiting, nullptr);  // the body has blocked
-  if (is_traced || tap != nullptr) tell(JobEventKind::Executed, running.ended, running.charged);
-  return finish(taker, running, outcome, doomed);
+  if (is_told) tell(JobEventKind::Executed, running.ended, running.charged);
+  return finish(taker, running, outcome);
 }
 
 inline Outcome Engine::call(const Assignment &assignment, RunningJob &running) {
@@ -125,51 +122,55 @@ inline Outcome Engine::call(const Assignment &assignment, RunningJob &running) {
   }
 }
 
-// Returns when the thread's next job begins. Moves the body to `doomed` if that was the last job of a removed task.
-[[gnu::always_inline]] inline Time Engine::finish(Taker &taker, RunningJob &running, Outcome outcome, Body &doomed) {
+// Returns when the thread's next job begins.
+[[gnu::always_inline]] inline Time Engine::finish(Taker &taker, RunningJob &running, Outcome outcome) {
   WorkerThread &self = taker.thread;
   TaskEntry &entry = *taker.next.assignment.entry;
   const Time at = running.ended;
-  const Job &job = taker.next.assignment.job;  // until the decision replaces it
-  const bool finished = outcome == Outcome::Finished;
-  const Duration response = at - job.release;
-  const Duration end_to_end = at - job.origin;
-  if (entry.response && finished) {
-    entry.response->add(response);
-    if (entry.end_to_end && entry.end_to_end != entry.response) entry.end_to_end->add(end_to_end);
+  const Job &job = running.job;  // until the decision replaces it
+  if (entry.response && outcome == Outcome::Finished) {
+    entry.response->add(at - job.release);
+    if (entry.end_to_end && entry.end_to_end != entry.response) entry.end_to_end->add(at - job.origin);
   }
-  bool delayed = false;
-  {
-    Locked locked(*this, &delayed);
-    withdraw_if_halting(locked);
-    entry.count(running.charged, running.earlier + at - running.here_since);
-    if (running.released != kNever) entry.count_tail(at - running.released);
-    self.used += running.charged - running.before;
-    if (finished) {
-      if (response > entry.deadline) count_late(job, entry, at);
-      if (end_to_end > entry.dag_deadline) ++entry.late_end_to_end;
-    } else if (running.cancelled) {
-      ++entry.cancelled;
-    }
-    if (options_.misses != nullptr && !running.cancelled) note_misses(locked, job, entry, at, outcome);
-    --entry.busy;
-    if (entry.removed && entry.busy == 0) doomed.swap(entry.body);
-    if (running.charged > running.limit) {
-      running.used_budget = running.used_budget || outcome == Outcome::BudgetExceeded;
-      report_limits(running, running.charged, at);
-    }
-    const sched::Step step = scheduler_->finish(running.slot, at, outcome, most_to_start());
-    if (may_hand_over() && placement_.hand_over(taker, step, tasks_, locked.waited())) {
-      if (!step.events.empty()) report(locked, step.events);
-    } else {
-      const bool is_caller = &self == &pool_.caller();
-      taker.next.kind = Next::Kind::Nothing;
-      placement_.end(self);
-      carry_out(locked, step, at, is_caller ? nullptr : &taker);
-      if (placement_.unfinished() == 0) end_of_jobs();
-    }
+  Locked locked(*this);
+  withdraw_if_halting(locked);
+  entry.count(running.charged, running.earlier + at - running.here_since);
+  if (running.has_released) entry.count_tail(at - running.released);
+  self.used += running.charged - running.before;
+  --entry.busy;
+  if (entry.is_special || outcome != Outcome::Finished) {
+    finish_special(locked, running, entry, outcome);
+  } else if (at - job.release > entry.deadline) {
+    count_late(job, entry, at);
   }
-  return delayed || !running.on_trust ? now() : at;
+  const sched::Step step = scheduler_->finish(job.slot, at, outcome, most_to_start());
+  if (may_hand_over() && placement_.hand_over(taker, step, tasks_, locked.waited())) {
+    if (!step.events.empty()) report(locked, step.events);
+  } else {
+    const bool is_caller = &self == &pool_.caller();
+    taker.next.kind = Next::Kind::Nothing;
+    placement_.end(self);
+    carry_out(locked, step, at, is_caller ? nullptr : &taker);
+    if (placement_.unfinished() == 0) end_of_jobs();
+  }
+  return locked.release() || !running.on_trust ? now() : at;
+}
+
+[[gnu::noinline]] void Engine::finish_special(Locked &locked, RunningJob &running, TaskEntry &entry, Outcome outcome) {
+  const Time at = running.ended;
+  const Job &job = running.job;
+  if (outcome == Outcome::Finished) {
+    if (at - job.release > entry.deadline) count_late(job, entry, at);
+    if (at - job.origin > entry.dag_deadline) ++entry.late_end_to_end;
+  } else if (running.cancelled) {
+    ++entry.cancelled;
+  }
+  if (options_.misses != nullptr && !running.cancelled) note_misses(locked, job, entry, at, outcome);
+  if (entry.removed && entry.busy == 0) locked.destroy(entry.body);
+  if (running.charged > running.limit) {
+    running.used_budget = running.used_budget || outcome == Outcome::BudgetExceeded;
+    report_limits(running, running.charged, at);
+  }
 }
 
 [[gnu::noinline]] void Engine::count_late(const Job &job, TaskEntry &entry, Time at) {
@@ -203,15 +204,17 @@ void Engine::end_of_jobs() {
   if (pause_waiters_ > 0) wake_pause_waiters();
 }
 
-RunningJob::RunningJob(Engine *its_engine, WorkerThread &its_thread) noexcept
+RunningJob::RunningJob(Engine *its_engine, WorkerThread &its_thread, const Job &its_job) noexcept
     : engine(its_engine),
       thread(its_thread.index),
       outranked(&its_thread.outranked),
       below(current()),
-      top(&its_thread.top) {}
+      top(&its_thread.top),
+      job(its_job) {}
 
 void RunningJob::close() noexcept {
-  if (ended == kNever) end();
+  if (!closed) end();
+  closed = true;
 }
 
 inline void RunningJob::end() noexcept {
@@ -245,7 +248,7 @@ void Engine::reach_limit(RunningJob &job, Duration used) {
   const Time at = now();
   Locked locked(*this);
   withdraw_if_halting(locked);
-  const TaskEntry &entry = tasks_[job.task];
+  const TaskEntry &entry = tasks_[job.job.task];
   const bool cut_off = entry.cuts_off && entry.budget > 0 && used > entry.budget;
   job.used_budget = job.used_budget || cut_off;
   report_limits(job, used, at);
@@ -255,20 +258,20 @@ void Engine::reach_limit(RunningJob &job, Duration used) {
 
 void Engine::report_limits(RunningJob &job, Duration used, Time now) {
   tell_limits(job, used, now, false);
-  job.limit = tasks_[job.task].next_limit(job);
+  job.limit = tasks_[job.job.task].next_limit(job);
 }
 
 // From outside, leaves a job that is to be cut off alone until its own preemption point or its end.
 bool Engine::tell_limits(RunningJob &job, Duration used, Time now, bool from_outside) {
-  const TaskEntry &entry = tasks_[job.task];
+  const TaskEntry &entry = tasks_[job.job.task];
   bool told = false;
   if (entry.wcet_low > 0 && used > entry.wcet_low && !job.used_wcet_low) {
     job.used_wcet_low = told = true;
-    scheduler_->exceed(job.slot, sched::Limit::WcetLow, now);
+    scheduler_->exceed(job.job.slot, sched::Limit::WcetLow, now);
   }
   if (entry.budget > 0 && used > entry.budget && !job.used_budget && !(from_outside && entry.cuts_off)) {
     job.used_budget = told = true;
-    scheduler_->exceed(job.slot, sched::Limit::Budget, now);
+    scheduler_->exceed(job.job.slot, sched::Limit::Budget, now);
   }
   return told;
 }
@@ -284,7 +287,7 @@ void Engine::watch(const WatchLimits &limits, Time as_of, std::vector<OverdueJob
   bool told = false;
   for (const auto &thread : pool_.threads()) {
     RunningJob *running = thread->stack.empty() ? nullptr : thread->top.load(std::memory_order_acquire);
-    if (running == nullptr || running->slot != thread->stack.back().slot) continue;
+    if (running == nullptr || running->job.slot != thread->stack.back().slot) continue;
     const Job &job = thread->stack.back();
     TaskEntry &entry = tasks_[job.task];
     const Duration elapsed = as_of - running->begun;
@@ -311,13 +314,13 @@ void Engine::watch(const WatchLimits &limits, Time as_of, std::vector<OverdueJob
 }
 
 void Engine::preemption_point(RunningJob &job) {
-  Taker taker{pool_[job.thread], job.slot, Next()};
+  Taker taker{.thread = pool_[job.thread], .below = job.job.slot, .takes_any = false};
   const Time at = now();
   {
     Locked locked(*this);
     withdraw_if_halting(locked);
-    if (!scheduler_->outranked(job.slot)) return;
-    scheduler_->preemption_point(job.slot, at);
+    if (!scheduler_->outranked(job.job.slot)) return;
+    scheduler_->preemption_point(job.job.slot, at);
     decide(locked, at, &taker);
   }
   if (taker.next.kind == Next::Kind::Start) {

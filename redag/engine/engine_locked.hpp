@@ -13,13 +13,12 @@
 
 namespace redag::runtime {
 
-/// Holds the engine's lock. Wakes threads and reports skips after releasing it. Most decisions have neither.
+/// Holds the engine's lock. Wakes threads, reports skips and destroys a body after releasing it. Most decisions have
+/// none of these.
 class REDAG_SCOPED_CAPABILITY Engine::Locked {
  public:
-  /// `delayed`, if not null, is set at the end: true if the thread slept for the lock, or woke others. Both can take
-  /// longer than a short job. A thread that has slept for the lock cannot know whether others do: its unlock() wakes.
-  explicit Locked(Engine &engine, bool *delayed = nullptr) REDAG_ACQUIRE(engine.lock_)
-      : engine_(engine), delayed_(delayed), wake_ups_(engine.realtime_), at_once_(engine.lock_.lock()) {}
+  explicit Locked(Engine &engine) REDAG_ACQUIRE(engine.lock_)
+      : engine_(engine), wake_ups_(engine.realtime_), at_once_(engine.lock_.lock()) {}
   /// For `releases` releases. Each can skip a ready job and one that waits for its predecessors. Allocates room for
   /// these skips before it takes the lock.
   Locked(Engine &engine, std::size_t releases) REDAG_ACQUIRE(engine.lock_)
@@ -31,12 +30,20 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
     at_once_ = engine_.lock_.lock();
   }
   ~Locked() REDAG_RELEASE() {
-    const bool woke = engine_.lock_.unlock();
-    if (delayed_ != nullptr) *delayed_ = woke || wake_ups_.any();
-    if (wake_ups_.any() || has_skips_) wake_and_tell();
+    if (!released_) static_cast<void>(release());
   }
   Locked(const Locked &) = delete;
   Locked &operator=(const Locked &) = delete;
+
+  /// Releases the lock before the end. Returns true if the thread slept for the lock, or woke others. Both can take
+  /// longer than a short job. A thread that has slept for the lock cannot know whether others do: its unlock() wakes.
+  bool release() REDAG_RELEASE() {
+    released_ = true;
+    const bool woke = engine_.lock_.unlock();
+    const bool delayed = woke || wake_ups_.any();
+    if (wake_ups_.any() || has_skips_) wake_and_tell();
+    return delayed;
+  }
 
   /// Allocates only if one decision skips more than kFewSkips jobs (HI mode begins or ends, a DAG goes).
   void tell(std::shared_ptr<SkipListener> listener, Reason reason) {
@@ -46,6 +53,11 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
     } else {
       skips_.more.push_back(Skip{std::move(listener), reason});
     }
+  }
+  /// Has the body, which is the user's code, destroyed without the lock.
+  void destroy(Body &body) {
+    if (!has_skips_) begin_skips();
+    skips_.doomed.swap(body);
   }
   /// Drops the skips: the caller itself reported them as missed.
   void tell_nobody() {
@@ -66,6 +78,7 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
     std::array<Skip, kFewSkips> few;  // the first `count` are used
     std::size_t count = 0;
     std::vector<Skip> more;
+    Body doomed;
   };
 
   [[gnu::noinline]] void wake_and_tell() {
@@ -85,10 +98,10 @@ class REDAG_SCOPED_CAPABILITY Engine::Locked {
   }
 
   Engine &engine_;
-  bool *delayed_ = nullptr;
   WakeUps wake_ups_;
   bool at_once_ = true;  // the lock was free
   bool has_skips_ = false;
+  bool released_ = false;
   union {
     // Constructed only with has_skips_: most decisions skip nothing.
     Skips skips_;  // NOLINT(readability-identifier-naming): a private member, of a union without a name

@@ -1,16 +1,26 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// The engine's tasks: adds, changes and removes them while jobs run, and reports their counts.
+// The engine's tasks: adds, changes and removes them while jobs run. Reports their counts, and the started jobs.
 #include <algorithm>
 
 #include "redag/base/check.hpp"
 #include "redag/base/lock_guard.hpp"
 #include "redag/engine/engine.hpp"
 #include "redag/engine/engine_locked.hpp"
+#include "redag/engine/running_job.hpp"
+#include "redag/engine/waiting_jobs.hpp"
+#include "redag/threads/clock.hpp"
 #include "redag/trace/tap.hpp"
 
 namespace redag::runtime {
+namespace {
+
+/// The thread to which a clock of pthread_getcpuclockid() belongs. Linux and every C library for it agree on this form:
+/// the bits above the lowest three are the complement of the thread's number.
+int thread_of(clockid_t cpu_clock) { return ~(cpu_clock >> 3); }
+
+}  // namespace
 
 void Engine::bind(const Workload &workload, std::vector<Body> bodies) {
   REDAG_CHECK(bodies.size() == workload.task_count(), "every task needs a body");
@@ -22,7 +32,7 @@ void Engine::bind(const Workload &workload, std::vector<Body> bodies) {
     for (std::size_t i = 0; i < dag.tasks.size(); ++i) ids.emplace_back(first + i);
     register_dag(DagId(d), dag, std::span(ids).subspan(first), std::span(bodies).subspan(first, dag.tasks.size()));
   }
-  tasks_changed();
+  order_.tasks_changed();
 }
 
 AddedDag Engine::add_dag(const Dag &dag, std::vector<Body> bodies) {
@@ -37,7 +47,7 @@ AddedDag Engine::add_dag(const Dag &dag, std::vector<Body> bodies) {
   register_dag(added.dag, dag, added.tasks, bodies);
   dag_deadlines_.resize(std::max<std::size_t>(dag_deadlines_.size(), added.dag.value + 1));
   dag_deadlines_[added.dag.value] = dag.deadline;
-  tasks_changed();
+  order_.tasks_changed();
   decide(locked, at);
   return added;
 }
@@ -54,7 +64,7 @@ TaskId Engine::add_task(DagId dag, std::uint32_t rank, const Task &task, Body bo
                       .has_predecessors = true,
                       .dag_deadline = dag.value < dag_deadlines_.size() ? dag_deadlines_[dag.value] : 0};
   register_task(id, task, role, body, std::move(listener));
-  tasks_changed();
+  order_.tasks_changed();
   decide(locked, at);
   return id;
 }
@@ -67,7 +77,7 @@ void Engine::remove_dag(DagId dag) {
   REDAG_CHECK(dag.value < scheduler_->dag_slots(), "removal of a DAG that does not exist");
   for (const TaskId task : scheduler_->tasks_of(dag)) tasks_.remove(task, doomed);
   scheduler_->remove_dag(dag, at);
-  tasks_changed();
+  order_.tasks_changed();
   decide(locked, at);
 }
 
@@ -79,7 +89,7 @@ void Engine::remove_task(TaskId task) {
   tasks_.remove(task, doomed);
   tasks_[task].waits_end = true;
   scheduler_->remove_task(task, at);
-  tasks_changed();
+  order_.tasks_changed();
   waiting_.cancel(task);
   decide(locked, at);
 }
@@ -100,7 +110,7 @@ void Engine::set_timing(TaskId task, Duration period, Duration deadline) {
   tasks_[task].period = period;
   tasks_[task].deadline = deadline;
   settled_ = at;
-  tasks_changed();
+  order_.tasks_changed();
   decide(locked, at);
 }
 
@@ -168,6 +178,34 @@ void Engine::figures(std::vector<DeviceFigures> &out) const {
   devices_.reserve(out);
   const LockGuard guard(lock_);
   devices_.figures(now(), out);
+}
+
+// For observers that look from time to time.
+void Engine::started(std::vector<StartedJob> &out) const {
+  out.clear();
+  out.reserve(2 * std::size_t{pool_.size()});  // mostly enough, which spares an allocation under the lock
+  {
+    const LockGuard guard(lock_);
+    for (const auto &thread : pool_.threads()) {
+      for (const Job &job : thread->stack) out.push_back(StartedJob{.job = job, .thread = thread->index});
+      if (thread->stack.empty()) continue;
+      StartedJob &topmost = out.back();
+      topmost.on_top = true;
+      // Null, or another job, while the thread is on its way into the job or out of it.
+      const RunningJob *running = thread->top.load(std::memory_order_acquire);
+      if (running != nullptr && running->job.slot == topmost.job.slot) topmost.begun = running->begun;
+    }
+    waiting_.for_each([&](const WaitingJob &job) {
+      if (job.thread == nullptr) return;
+      out.push_back({.job = job.job, .thread = job.thread->index, .on_top = true, .lends = true, .begun = job.begun});
+    });
+  }
+  for (StartedJob &started : out) {
+    if (started.begun == kNever) continue;
+    const clockid_t clock = pool_.threads()[started.thread]->cpu_clock;
+    started.thread_cpu = cpu_now(clock);
+    started.thread_id = thread_of(clock);
+  }
 }
 
 }  // namespace redag::runtime

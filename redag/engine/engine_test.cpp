@@ -364,7 +364,7 @@ TEST_P(EngineInEveryMode, RunOneNeedsNoThreads) {
     bench.bodies[t] = [&, t](const Job &) -> Outcome {
       EXPECT_EQ(std::this_thread::get_id(), here);
       const RunningJob *job = bench.engine->current_job();
-      EXPECT_TRUE(job != nullptr && job->task == TaskId(t));
+      EXPECT_TRUE(job != nullptr && job->job.task == TaskId(t));
       if (t == 0) bench.release({2});
       preemption_point();
       if (t == 1) throw std::runtime_error("no");

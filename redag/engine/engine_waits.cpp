@@ -49,37 +49,34 @@ std::optional<Time> Engine::suspend(Taker &taker, RunningJob &running) {
     delete std::exchange(running.waiting, nullptr);  // the destructors of the body's locals run here
     return std::nullopt;
   }
-  bool delayed = false;
-  {
-    Locked locked(*this, &delayed);
-    withdraw_if_halting(locked);
-    self.used += running.charged - running.before;
-    if (running.charged > running.limit) report_limits(running, running.charged, at);
-    job.wait = running.wait;
-    job.job = taker.next.assignment.job;
-    job.entry = &entry;
-    job.begun = running.begun;
-    job.charged = running.charged;
-    job.earlier = running.earlier + at - running.here_since;
-    job.level = self.level;
-    job.measured = running.measured;
-    job.used_wcet_low = running.used_wcet_low;
-    job.used_budget = running.used_budget;
-    job.reported = running.reported;
-    waiting_.add(job, at);
-    placement_.leave(self);
-    scheduler_->wait(running.slot, job.wait->device, at);
-    const Time alarm = waiting_.next_alarm();
-    if (!waiting_.begin(*job.wait)) {
-      waiting_.end(running.slot, at);
-      scheduler_->wake(running.slot, at);
-    } else if (waiting_.next_alarm() < alarm) {
-      sleepers_->changed();
-    }
-    taker.next.kind = Next::Kind::Nothing;
-    decide(locked, at, &taker);
+  Locked locked(*this);
+  withdraw_if_halting(locked);
+  self.used += running.charged - running.before;
+  if (running.charged > running.limit) report_limits(running, running.charged, at);
+  job.wait = running.wait;
+  job.job = running.job;
+  job.entry = &entry;
+  job.begun = running.begun;
+  job.charged = running.charged;
+  job.earlier = running.earlier + at - running.here_since;
+  job.level = self.level;
+  job.measured = running.measured;
+  job.used_wcet_low = running.used_wcet_low;
+  job.used_budget = running.used_budget;
+  job.reported = running.reported;
+  waiting_.add(job, at);
+  placement_.leave(self);
+  scheduler_->wait(job.job.slot, job.wait->device, at);
+  const Time alarm = waiting_.next_alarm();
+  if (!waiting_.begin(*job.wait)) {
+    waiting_.end(job.job.slot, at);
+    scheduler_->wake(job.job.slot, at);
+  } else if (waiting_.next_alarm() < alarm) {
+    sleepers_->changed();
   }
-  return delayed || !running.on_trust ? now() : at;
+  taker.next.kind = Next::Kind::Nothing;
+  decide(locked, at, &taker);
+  return locked.release() || !running.on_trust ? now() : at;
 }
 
 // The body is about to block: as suspend(), but the job keeps its thread.
@@ -93,7 +90,7 @@ bool Engine::lend_worker(RunningJob &running) {
   Locked locked(*this);
   withdraw_if_halting(locked);
   job.job = self.stack.back();
-  job.entry = &tasks_[running.task];
+  job.entry = &tasks_[running.job.task];
   if (running.below != nullptr || !placement_.lend(self)) {
     ++job.entry->kept_worker;
     return false;
@@ -110,7 +107,7 @@ bool Engine::lend_worker(RunningJob &running) {
   job.charged = running.before;
   job.reported = running.reported;
   waiting_.add(job, at);
-  scheduler_->wait(running.slot, DeviceId(), at);
+  scheduler_->wait(job.job.slot, DeviceId(), at);
   decide(locked, at);
   return true;
 }
@@ -125,7 +122,7 @@ void Engine::take_worker(RunningJob &running) {
     Locked locked(*this);
     withdraw_if_halting(locked);
     self.used += used;
-    wake(running.slot, at);
+    wake(running.job.slot, at);
     decide(locked, at);
   }
   self.wait_for_worker();

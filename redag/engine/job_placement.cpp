@@ -19,7 +19,7 @@ JobPlacement::JobPlacement(WorkerPool &pool, WaitingJobs &waiting, bool os, cons
       os_(os),
       band_(band),
       priorities_(os ? pool.size() : 0, band.top_job),
-      mailboxes_(pool.size(), lookout, !os),
+      mailboxes_(pool.size(), lookout, !os && pool.size() > 1),
       spare_(spare),
       of_leader_(band_.timer) {
   moves_.reserve(os ? pool.size() : 0);
@@ -85,12 +85,11 @@ const Dispatch *JobPlacement::serve(Taker &taker, const sched::Step &step, const
   const bool is_caller = &self == &pool_.caller();
   taker.next.kind = Next::Kind::Nothing;
   const Dispatch *own = choose_own(step, taker.below);
-  const bool can_choose = is_free(taker);
-  if (can_choose && own != nullptr && mailboxes_.should_leave(tasks[own->task], situation.waited)) {
+  if (taker.takes_any && own != nullptr && mailboxes_.should_leave(tasks[own->task], situation.waited)) {
     add_idle(self, situation.may_lead);
     return nullptr;
   }
-  if (can_choose) {
+  if (taker.takes_any) {
     // In `os` mode a thread steals only if it would be idle: two threads that exchange jobs must exchange priorities.
     const std::uint32_t above = own == nullptr ? sched::kNoLimit : (os_ ? 0 : own->level);
     if (WorkerThread *other = mailboxes_.steal(above)) {
@@ -106,7 +105,7 @@ const Dispatch *JobPlacement::serve(Taker &taker, const sched::Step &step, const
   taker.next.kind = Next::Kind::Start;
   assign(self, *own, entry, taker.next.assignment);
   if (!is_caller) set_priority_for_job(self, taker.next.assignment);
-  if (can_choose) mailboxes_.begin(self, entry);
+  if (taker.takes_any) mailboxes_.begin(self, entry);
   return own;
 }
 
@@ -141,7 +140,6 @@ void JobPlacement::fill_woken(WorkerThread &thread, const Dispatch &dispatch, co
   assignment.job = job.job;
   assignment.entry = job.entry;
   assignment.woken = &job;
-  assignment.measured = job.measured;
   assignment.expected_short = entry.expected_short();
 }
 

@@ -32,11 +32,12 @@ struct Next {
   Assignment assignment;
 };
 
-/// A thread that has lost its job and can take another: which job that is suspended on it, and what it does next.
+/// A thread that has lost its job and can take another.
 struct Taker {
   WorkerThread &thread;
-  JobSlot below;
-  Next next;
+  JobSlot below;   // the job that is suspended on it
+  bool takes_any;  // it can have any job next: none is suspended on it, and it is one of the pool's
+  Next next = {};
 };
 
 /// What a decision is placed under.
@@ -64,7 +65,7 @@ class JobPlacement {
   /// is for the usual case: one job starts, and the thread begins it. `waited`: it waited for the engine's lock.
   /// Returns false in all other cases, in which end() and place() are to be called.
   bool hand_over(Taker &taker, const sched::Step &step, TaskTable &tasks, bool waited) {
-    if (step.dispatches.size() != 1 || !is_free(taker)) return false;
+    if (step.dispatches.size() != 1 || !taker.takes_any) return false;
     const sched::Dispatch &next = step.dispatches.front();
     if (next.kind != sched::DispatchKind::Start) return false;
     // With `os` a thread that has a job of its own steals none, but silent mail has to wake its thread.
@@ -120,10 +121,6 @@ class JobPlacement {
   [[nodiscard]] int priority_of_level(std::uint32_t level) const { return band_.of_level(level); }
 
  private:
-  /// Returns true if the thread can have any job next: none is suspended on it, and it is one of the pool's.
-  [[nodiscard]] bool is_free(const Taker &taker) const {
-    return !taker.below.valid() && &taker.thread != &pool_.caller();
-  }
   /// Returns true if the job needs a thread: it starts, or it has waited and goes on.
   [[nodiscard]] bool needs_thread(const sched::Dispatch &dispatch) const {
     if (dispatch.kind == sched::DispatchKind::Start) return true;
@@ -163,7 +160,6 @@ class JobPlacement {
                       .worker = dispatch.worker};
     assignment.entry = &entry;
     assignment.woken = nullptr;
-    assignment.measured = entry.always_measured;
     assignment.expected_short = entry.expected_short();
     thread.level = dispatch.level;
   }

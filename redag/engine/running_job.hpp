@@ -8,8 +8,8 @@
 #include <cstdint>
 
 #include "redag/base/atomic.hpp"
-#include "redag/base/ids.hpp"
 #include "redag/base/time.hpp"
+#include "redag/engine/job_body.hpp"
 #include "redag/threads/cpu_meter.hpp"
 
 namespace redag::runtime {
@@ -30,7 +30,8 @@ extern constinit thread_local RunningJob *current_job __attribute__((tls_model("
 }  // namespace detail
 
 struct RunningJob {
-  RunningJob(Engine *its_engine, WorkerThread &its_thread) noexcept;
+  /// `its_job`: where the thread keeps the job that it runs.
+  RunningJob(Engine *its_engine, WorkerThread &its_thread, const Job &its_job) noexcept;
   RunningJob(const RunningJob &) = delete;
   RunningJob &operator=(const RunningJob &) = delete;
 
@@ -40,30 +41,31 @@ struct RunningJob {
   const Atomic<bool> *const outranked;  // set while a more urgent job could run on top
   RunningJob *const below;
   Atomic<RunningJob *> *const top;  // WorkerThread::top of its thread: points here while the body runs
+  const Job &job;                   // another one after each decision for the thread
 
   // Set by Engine::run_next() for each job:
-  TaskId task;
-  JobSlot slot;
-  Time origin = 0;             // see Job
-  Duration limit = kNever;     // processor time of its next limit to check; kNever: none
-  Time begun = 0;              // on the engine's clock
-  Time here_since = 0;         // on the engine's clock: when it began, or went on after its last wait
-  CpuMeter::Start start;       // of its stretch since then; excludes jobs that ran on top
-  Duration before = 0;         // processor time until then
-  Duration earlier = 0;        // how long it was in progress on threads until then
-  Time released = kNever;      // when its body first released a job; kNever: it has not
-  bool measured = false;       // its processor time is asked for, however short it was
-  bool used_wcet_low = false;  // reported to the scheduler; written under the engine's lock
-  bool used_budget = false;
-  bool reported = false;            // was reported overdue; written under the engine's lock
-  bool cancelled = false;           // it ended because its wait was cancelled
-  bool blocks = false;              // it has lent its worker: it is in a redag::Blocking
+  Duration limit = kNever;  // processor time of its next limit to check; kNever: none
+  Time begun = 0;           // on the engine's clock
+  Time here_since = 0;      // on the engine's clock: when it began, or went on after its last wait
+  CpuMeter::Start start;    // of its stretch since then; excludes jobs that ran on top
+  Duration before = 0;      // processor time until then
+  Duration earlier = 0;     // how long it was in progress on threads until then
+  bool measured = false;    // its processor time is asked for, however short it was
+  // The next eight are unset for each job by one instruction:
+  bool used_wcet_low = false;     // reported to the scheduler; written under the engine's lock
+  bool used_budget = false;       // the same
+  bool reported = false;          // was reported overdue; written under the engine's lock
+  bool cancelled = false;         // it ended because its wait was cancelled
+  bool blocks = false;            // it has lent its worker: it is in a redag::Blocking
+  bool begins_coroutine = false;  // the body is in the first stretch of a coroutine
+  bool has_released = false;      // its body has released a job, first at `released`
+  bool closed = false;            // close() has been called
+  Time released = 0;
   WaitingJob *waiting = nullptr;    // what is kept of it between its waits; null: it has not waited
   detail::Wait *wait = nullptr;     // set by the body when it returns at a co_await; null: it has ended
-  bool begins_coroutine = false;    // the body is in the first stretch of a coroutine
   CoroutineOwner *owner = nullptr;  // set by the body where it has one: of a coroutine that it may begin
   // Set by close():
-  Time ended = kNever;    // on the engine's clock; kNever: the last stretch goes on
+  Time ended = 0;         // on the engine's clock
   Duration charged = 0;   // processor time of the whole job
   bool on_trust = false;  // `charged` counts the time that the last stretch took on the clock
 

@@ -41,12 +41,13 @@ void TaskTable::add(TaskId id, const Task &task, const TaskRole &role, Body &bod
     entry.end_to_end = role.has_predecessors ? std::make_shared<Histogram>() : entry.response;
   }
   entry.concurrency = task.concurrency;
+  entry.is_special = logs_misses_ || entry.first_limit != kNever || entry.dag_deadline != kNever;
 }
 
 void TaskTable::remove(TaskId id, std::vector<Body> &doomed) {
   REDAG_CHECK(id.value < entries_.size(), "removal of a task that does not exist");
   TaskEntry &entry = *entries_[id.value];
-  entry.removed = true;
+  entry.removed = entry.is_special = true;
   entry.listener.reset();
   if (entry.busy == 0) doomed.emplace_back().swap(entry.body);
 }

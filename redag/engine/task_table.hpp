@@ -90,8 +90,9 @@ struct TaskEntry {
   Duration dag_deadline = kNever;       // of a sink; kNever: none
   std::shared_ptr<Histogram> response;  // null: not measured
   std::shared_ptr<Histogram>
-      end_to_end;                     // of a sink; null: not measured. `response` itself if nothing precedes the task
-  std::uint64_t late = 0;             // finished after the deadline
+      end_to_end;           // of a sink; null: not measured. `response` itself if nothing precedes the task
+  bool is_special = false;  // more is done at a job's end: limits, an end-to-end deadline, a log of misses, a removal
+  std::uint64_t late = 0;   // finished after the deadline
   std::uint64_t late_end_to_end = 0;  // finished after the DAG's deadline
   std::uint64_t preemptions = 0;
   std::uint64_t withdrawn = 0;    // jobs skipped by halt()
@@ -122,7 +123,8 @@ struct TaskEntry {
 class TaskTable {
  public:
   /// measure: entries have histograms of responses.
-  explicit TaskTable(bool measure) : measure_(measure) {}
+  /// logs_misses: somebody is told of every miss.
+  TaskTable(bool measure, bool logs_misses) : measure_(measure), logs_misses_(logs_misses) {}
 
   /// Adds a task and takes its body. A reused id starts with a new entry: its former body was destroyed when its last
   /// job ended. `listener` can be null.
@@ -138,7 +140,8 @@ class TaskTable {
   [[nodiscard]] std::size_t most_started() const { return most_started_; }
 
  private:
-  bool measure_;
+  const bool measure_;
+  const bool logs_misses_;
   std::vector<std::unique_ptr<TaskEntry>> entries_;  // entries keep their addresses
   std::size_t most_started_ = 0;
 };

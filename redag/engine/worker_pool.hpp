@@ -26,7 +26,6 @@ struct Assignment {
   Job job;
   TaskEntry *entry = nullptr;   // keeps its address; its body is not touched while `busy`
   WaitingJob *woken = nullptr;  // the job has waited and goes on; null: it begins
-  bool measured = false;        // its processor time is asked for, however short it was
   bool expected_short = false;
 };
 

@@ -13,9 +13,9 @@
 
 #include "redag/base/cpu_list.hpp"
 #include "redag/base/text.hpp"
+#include "redag/loader/callback_match.hpp"
 #include "redag/loader/validate_edges.hpp"
 #include "redag/loader/validate_waits.hpp"
-#include "redag/model/callback_match.hpp"
 #include "redag/model/clusters.hpp"
 
 namespace redag {

@@ -22,7 +22,6 @@ PriorityDispatcher::PriorityDispatcher(JobTable &table)
   REDAG_CHECK(table.config.workers > 0, "a platform has at least one worker");
   REDAG_CHECK(table.config.levels == 0 || static_, "limited levels need a static policy");
   open_workers_.reserve(table.config.workers);
-  for (std::uint32_t w = 0; w < table.config.workers; ++w) free_workers_.set(w);
 }
 
 // ---- decisions ----
@@ -196,7 +195,7 @@ inline bool PriorityDispatcher::outranks(const Job &a, const Job &b) const {
 
 inline void PriorityDispatcher::make_way(Place place) {
   if (place.victim == kNil) {
-    free_workers_.clear(place.worker.value);
+    free_workers_.remove(place.worker.value);
     return;
   }
   // Cooperative: a job under one that has ended is already suspended.
@@ -342,7 +341,7 @@ inline void PriorityDispatcher::leave_worker(const Job &job) {
   worker.stack = job.under;
   if (worker.stack == kNil) {
     worker.open = false;
-    free_workers_.set(job.worker.value);
+    free_workers_.add(job.worker.value);
   } else {
     open(job.worker.value);
   }

@@ -10,6 +10,7 @@
 // changed its priority.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -82,6 +83,32 @@ class PriorityDispatcher {
   struct Place {
     WorkerId worker;              // invalid: there is no place
     std::uint32_t victim = kNil;  // the job that loses the worker
+  };
+
+  /// The worker that became free last is kept apart. Mostly it is taken at once, and never enters the set.
+  class FreeWorkers {
+   public:
+    explicit FreeWorkers(std::uint32_t workers) : others_(workers) {
+      for (std::uint32_t w = 0; w < workers; ++w) others_.set(w);
+    }
+    void add(std::uint32_t worker) {
+      if (last_ != kNil) others_.set(last_);
+      last_ = worker;
+    }
+    void remove(std::uint32_t worker) {
+      if (worker == last_) {
+        last_ = kNil;
+      } else {
+        others_.clear(worker);
+      }
+    }
+    [[nodiscard]] bool empty() const { return last_ == kNil && others_.empty(); }
+    /// Requires !empty().
+    [[nodiscard]] std::uint32_t first() const { return others_.empty() ? last_ : std::min(last_, others_.first()); }
+
+   private:
+    std::uint32_t last_ = kNil;
+    LevelBitmap others_;
   };
 
   /// Returns false if no job can start or resume, whichever it is.
@@ -166,7 +193,7 @@ class PriorityDispatcher {
   std::vector<TaskGates> task_gates_;  // by TaskId
   std::vector<Gate> shared_gates_;
   std::vector<Worker> workers_;
-  LevelBitmap free_workers_;
+  FreeWorkers free_workers_;
   std::vector<std::uint32_t> open_workers_;
   DeviceQueues devices_;
   std::uint32_t least_urgent_ = kNil;  // Full: the least urgent running job; kNil: not known

@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include "redag/model/callback_match.hpp"
+#include "redag/loader/callback_match.hpp"
 #include "redag_analysis/metrics/duration_sketch.hpp"
 #include "redag_lab/import/event.hpp"
 

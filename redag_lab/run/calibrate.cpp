@@ -19,13 +19,13 @@
 
 #include "redag/base/check.hpp"
 #include "redag/base/int128.hpp"
-#include "redag/base/rounded_time.hpp"
 #include "redag/engine/preemption_point.hpp"
 #include "redag/threads/clock.hpp"
 #include "redag/threads/parker.hpp"
 #include "redag/threads/setup.hpp"
 #include "redag/threads/threads.hpp"
 #include "redag/trace/trace.hpp"
+#include "redag_analysis/text/rounded_time.hpp"
 #include "redag_lab/run/run_workload.hpp"
 
 namespace redag::lab {

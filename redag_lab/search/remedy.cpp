@@ -7,9 +7,9 @@
 
 #include <fmt/format.h>
 
-#include "redag/base/rounded_time.hpp"
 #include "redag/sched/policy.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
+#include "redag_analysis/text/rounded_time.hpp"
 #include "redag_lab/search/sensitivity.hpp"
 
 namespace redag::lab {

@@ -8,7 +8,7 @@
 #include "redag/base/check.hpp"
 #include "redag/base/cpu_list.hpp"
 #include "redag/base/time.hpp"
-#include "redag/model/callback_match.hpp"
+#include "redag/loader/callback_match.hpp"
 #include "tests/fuzz/targets.hpp"
 
 namespace redag::fuzz {

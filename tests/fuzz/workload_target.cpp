@@ -4,9 +4,9 @@
 #include <string>
 
 #include "redag/base/check.hpp"
+#include "redag/loader/callback_match.hpp"
 #include "redag/loader/workload_yaml.hpp"
 #include "redag/loader/workload_yaml_edit.hpp"
-#include "redag/model/callback_match.hpp"
 #include "tests/fuzz/targets.hpp"
 
 namespace redag::fuzz {

@@ -7,7 +7,7 @@
 
 # These are compiled alone: another source of their target has an anonymous namespace with the same name in it.
 set(alone
-  redag/model/callback_match_test.cpp
+  redag/loader/callback_match_test.cpp
   redag_analysis/analyze/examples_test.cpp
   redag_analysis/core/waiting_test.cpp
   redag_analysis/many_workers/dag_shapes_test.cpp

@@ -8,8 +8,8 @@
 #include <algorithm>
 #include <optional>
 
-#include "redag/base/rounded_time.hpp"
 #include "redag/base/text.hpp"
+#include "redag_analysis/text/rounded_time.hpp"
 #include "redag_analysis/text/table.hpp"
 #include "redag_lab/cli/terminal/options.hpp"
 

@@ -8,8 +8,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "redag/base/rounded_time.hpp"
 #include "redag/base/text.hpp"
+#include "redag_analysis/text/rounded_time.hpp"
 #include "redag_analysis/text/table.hpp"
 
 namespace redag::cli {

@@ -8,10 +8,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "redag/base/rounded_time.hpp"
 #include "redag/base/text.hpp"
 #include "redag/base/words.hpp"
 #include "redag/trace/trace.hpp"
+#include "redag_analysis/text/rounded_time.hpp"
 #include "redag_analysis/text/table.hpp"
 #include "redag_lab/search/remedy.hpp"
 

@@ -24,7 +24,7 @@
 #include "rclcpp/node_interfaces/node_base_interface.hpp"
 #include "recursive_mutex.hpp"
 #include "redag/base/lock_guard.hpp"
-#include "redag/model/callback_match.hpp"
+#include "redag/loader/callback_match.hpp"
 #include "redag_rclcpp/executor.hpp"
 #include "release_timer.hpp"
 #include "task_table.hpp"

@@ -17,7 +17,7 @@
 #include "redag/base/pi_mutex.hpp"
 #include "redag/engine/engine.hpp"
 #include "redag/live/frame_builder.hpp"
-#include "redag/model/callback_match.hpp"
+#include "redag/loader/callback_match.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/trace/trace.hpp"
 #include "redag_rclcpp/executor.hpp"

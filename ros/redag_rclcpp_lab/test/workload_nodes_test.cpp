@@ -16,8 +16,8 @@
 
 #include "node_events.hpp"
 #include "peers.hpp"
+#include "redag/loader/callback_match.hpp"
 #include "redag/loader/workload_yaml.hpp"
-#include "redag/model/callback_match.hpp"
 #include "redag/model/demand.hpp"
 #include "redag/threads/setup.hpp"
 #include "redag/trace/worker_count.hpp"

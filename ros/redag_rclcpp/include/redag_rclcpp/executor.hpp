@@ -23,7 +23,7 @@
 
 #include "rclcpp/executor.hpp"
 #include "redag/engine/engine.hpp"
-#include "redag/model/callback_match.hpp"
+#include "redag/loader/callback_match.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/threads/setup.hpp"
 #include "redag/trace/trace.hpp"

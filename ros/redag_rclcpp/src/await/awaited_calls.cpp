@@ -159,7 +159,7 @@ bool AwaitedCalls::deliver(const Response &response) {
 AwaitedCalls::Call::Call(AwaitedCalls &calls) : calls_(calls) {
   const redag::runtime::RunningJob &running = *redag::runtime::RunningJob::current();
   engine_ = running.engine;
-  task_ = running.task;
+  task_ = running.job.task;
   const redag::LockGuard guard(calls_.lock_);
   calls_.calls_.push_back(this);
   calls_.awaited_.store(calls_.calls_.size(), std::memory_order_release);

@@ -87,7 +87,7 @@ void ArrivalCallback::arrived(std::size_t count, Source source, int part, bool s
                          .source = source,
                          .part = part,
                          .seen_only = seen_only,
-                         .sender = publisher == nullptr ? redag::JobSlot() : publisher->slot});
+                         .sender = publisher == nullptr ? redag::JobSlot() : publisher->job.slot});
       ++kept_[index_of(source)];
     }
     if (replaces) {
@@ -288,9 +288,9 @@ bool ArrivalCallback::run_newest(Time release) {
 // each other in a circle would go first for ever.
 Time ArrivalCallback::origin_of(Time now, const redag::runtime::RunningJob *publisher) {
   Time origin = now;
-  const bool is_young = publisher != nullptr && now - publisher->origin <= deadline();
-  if (is_young && publisher->origin != last_origin_) {
-    origin = publisher->origin;
+  const bool is_young = publisher != nullptr && now - publisher->job.origin <= deadline();
+  if (is_young && publisher->job.origin != last_origin_) {
+    origin = publisher->job.origin;
   }
   last_origin_ = origin;
   return origin;
@@ -304,8 +304,9 @@ bool ArrivalCallback::learn_from_arrival(Time now, std::size_t count, Source sou
   if (arrivals_[0] + arrivals_[1] == 0) first_arrival_ = now;
   last_arrival_ = now;
   arrivals_[index_of(source)] += count;
-  if (publisher != nullptr && std::find(publishers_.begin(), publishers_.end(), publisher->task) == publishers_.end()) {
-    publishers_.push_back(publisher->task);
+  if (publisher != nullptr &&
+      std::find(publishers_.begin(), publishers_.end(), publisher->job.task) == publishers_.end()) {
+    publishers_.push_back(publisher->job.task);
   }
   has_learned_ = now - first_arrival_ >= learning_time;
   const std::uint64_t arrivals = arrivals_[0] + arrivals_[1];

@@ -23,7 +23,7 @@
 #include "redag/base/pi_mutex.hpp"
 #include "redag/engine/coroutine_body.hpp"
 #include "redag/engine/engine.hpp"
-#include "redag/model/callback_match.hpp"
+#include "redag/loader/callback_match.hpp"
 #include "timer_queue.hpp"
 #include "watch/deadlock_detector.hpp"
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag/model/callback_match.hpp"
+#include "redag/loader/callback_match.hpp"
 
 #include <algorithm>
 #include <string>

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag/base/rounded_time.hpp"
+#include "redag_analysis/text/rounded_time.hpp"
 
 namespace redag {
 namespace {
