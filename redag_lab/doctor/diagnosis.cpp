@@ -157,7 +157,7 @@ Line judge(const HistogramCounts &wake_ups) {
           {verdict, fmt::format("median {}, 99 % {}, longest {}", humanize_up(wake_ups.quantile(0.5)),
                                 humanize_up(wake_ups.quantile(0.99)), humanize_up(longest))},
           "Each release of a timer can be as late as a thread wakes up. Up to 100us is good, 1ms the most to bear.",
-          "mend the lines above, then measure again while the robot's other programs run"};
+          "the lines above; then measure again, while the robot's other programs run"};
 }
 
 }  // namespace redag::doctor

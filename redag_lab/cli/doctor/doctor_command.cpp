@@ -105,10 +105,10 @@ Action add_doctor(CLI::App &app) {
   app.add_option("--attach", arguments->attach, "Also examine this running process, or the container that it is in")
       ->type_name("PID");
   CLI::Option *measure =
-      add_duration(app, "--measure", arguments->measure, "Measure wake-ups and overheads for that long, by default 10s")
+      add_duration(app, "--measure", arguments->measure, "Also measure wake-ups and overheads, for that long")
           ->type_name("[DURATION]")
           ->expected(0, 1)
-          ->transform([](const std::string &given) { return given == "true" ? "10s" : given; });  // CLI11's of none
+          ->default_str("10s");  // without a value
   app.add_option("--out", arguments->out, "File for the measured overheads")
       ->type_name("FILE")
       ->capture_default_str()

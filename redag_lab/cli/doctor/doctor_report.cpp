@@ -49,12 +49,14 @@ Table thread_table(const std::vector<doctor::Thread> &threads) {
                {.title = "policy", .importance = 1},
                {.title = "processors", .importance = 2},
                {.title = "threads", .importance = 4, .prose = true}});
-  std::map<std::tuple<int, int, std::vector<int>>, std::vector<std::string>> rows;
+  std::map<std::tuple<int, int, std::vector<int>>, std::map<std::string, int>> rows;
   for (const doctor::Thread &thread : threads) {
-    rows[{-thread.priority, thread.policy, thread.cpus}].push_back(thread.name);
+    ++rows[{-thread.priority, thread.policy, thread.cpus}][thread.name];
   }
-  for (const auto &[key, names] : rows) {
+  for (const auto &[key, counts] : rows) {
     const auto &[priority, policy, cpus] = key;
+    std::vector<std::string> names;
+    for (const auto &[name, count] : counts) names.push_back(count == 1 ? name : fmt::format("{} ({})", name, count));
     constexpr std::size_t kShown = 8;
     table.add(
         {{fmt::format("{}", -priority)}, {policy_name(policy)}, {format_cpu_list(cpus)}, {join_first(names, kShown)}});
@@ -127,7 +129,7 @@ std::string describe(const doctor::Diagnosis &diagnosis, std::size_t width, bool
       counts.push_back(fmt::format("{} {}", diagnosis.count(verdict), to_string(verdict)));
   }
   const bool bad = diagnosis.count(doctor::Verdict::Red) > 0;
-  const char *const answer = bad ? "this machine keeps no real-time promises yet"
+  const char *const answer = bad                                             ? "mend the red lines"
                              : diagnosis.count(doctor::Verdict::Unknown) > 0 ? "nothing that could be read is red"
                                                                              : "nothing is red";
   return text + "\n" + fitted(fmt::format("{}: {}\n", join(counts), answer), width);

@@ -43,7 +43,7 @@ TEST(DoctorReport, TheAnswerIsThatOfTheWorstLine) {
   EXPECT_THAT(describe(diagnosis, 80, false), HasSubstr("unknown  SMT: /sys: No such file or directory\n\n"));
   EXPECT_THAT(describe(diagnosis, 80, false), HasSubstr("1 unknown: nothing that could be read is red\n"));
   diagnosis.lines.push_back({"clock source", {doctor::Verdict::Red, "'hpet'"}, "why", "mend"});
-  EXPECT_THAT(describe(diagnosis, 80, false), HasSubstr("this machine keeps no real-time promises yet\n"));
+  EXPECT_THAT(describe(diagnosis, 80, false), HasSubstr("mend the red lines\n"));
   const Json json = to_json(diagnosis, nullptr);
   EXPECT_EQ(json.at("red"), 1);
   EXPECT_EQ(json.at("lines").at(3).at("verdict"), "red");
@@ -55,9 +55,10 @@ TEST(DoctorReport, ThreadsOfOneSchedulingShareARow) {
   diagnosis.processes = {{"100"}};
   diagnosis.threads = {{.id = 100, .name = "main", .policy = 0, .priority = 0, .cpus = {0, 1}},
                        {.id = 101, .name = "redag-timer", .policy = 1, .priority = 90, .cpus = {0, 1}},
-                       {.id = 102, .name = "redag-wait", .policy = 1, .priority = 90, .cpus = {0, 1}}};
+                       {.id = 102, .name = "redag-wait", .policy = 1, .priority = 90, .cpus = {0, 1}},
+                       {.id = 103, .name = "redag-wait", .policy = 1, .priority = 90, .cpus = {0, 1}}};
   EXPECT_THAT(describe(diagnosis, 80, false), HasSubstr("priority  policy  processors  threads\n"
-                                                        "      90  fifo    0-1         redag-timer and redag-wait\n"
+                                                        "      90  fifo    0-1         redag-timer and redag-wait (2)\n"
                                                         "       0  other   0-1         main\n"));
   EXPECT_EQ(to_json(diagnosis, nullptr).at("threads").at(1).at("policy"), "fifo");
 }
