@@ -30,7 +30,6 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-using ::testing::Not;
 
 std::string limits(const char *rtprio, const char *memlock) {
   return fmt::format(
