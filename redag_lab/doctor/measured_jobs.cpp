@@ -14,12 +14,12 @@
 
 #include "redag/engine/preemption_point.hpp"
 #include "redag/threads/clock.hpp"
+#include "redag_lab/doctor/watch.hpp"
 
 namespace redag::doctor {
 namespace {
 
 constexpr Duration kRegion = 200 * kMicrosecond;
-constexpr Duration kShortestGap = 2 * kMicrosecond;  // shorter ones are caused by the loop itself
 constexpr const char *kLong = "long";
 
 // Returns the processor-time clock of the thread of that name; nothing if there is no such thread.

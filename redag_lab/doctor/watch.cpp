@@ -16,7 +16,6 @@ constexpr std::size_t kMostGaps = std::size_t{1} << 17U;
 
 // Appends to `gaps`, within its capacity, the gaps until that time. They begin after `watched`, to which it adds.
 void watch_until(Time until, Duration &watched, std::vector<Gap> &gaps) {
-  constexpr Duration kShortestGap = 2 * kMicrosecond;  // shorter ones are caused by the loop itself
   Duration cpu = runtime::thread_cpu_now();
   Time read_at = runtime::monotonic_now();
   const Time begun = read_at;

@@ -20,6 +20,9 @@ struct Gap {
   Duration charged = 0;  // processor time charged to the thread: the kernel's work in its name
 };
 
+/// Shorter gaps are caused by the loop that reads the clock.
+inline constexpr Duration kShortestGap = 2 * kMicrosecond;
+
 struct WatchedProcessor {
   Duration watched = 0;
   std::vector<Gap> gaps;
