@@ -118,7 +118,7 @@ class Measuring {
       if (options_.progress) {
         options_.progress(static_cast<double>(done) / static_cast<double>(turns * count), slice.name);
       }
-      if (const Result<void> measured = (this->*slice.measure)(slice.realtime, length); !measured) return measured;
+      if (Result<void> measured = (this->*slice.measure)(slice.realtime, length); !measured) return measured;
       if (options_.stop->load()) {
         return make_error("interrupted: a part of a measurement can miss the largest values");
       }
