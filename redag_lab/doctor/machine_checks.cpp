@@ -118,7 +118,7 @@ Finding check_idle_states(const Subject &subject) {
   return on_each_processor(subject, [&](const std::string &cpu) -> Finding {
     std::int64_t longest = -1;
     for (const std::string &state : subject.machine.names_in(cpu + "cpuidle")) {
-      const std::string folder = cpu + "cpuidle/" + state;
+      const std::string folder = fmt::format("{}cpuidle/{}", cpu, state);
       const std::int64_t latency = subject.machine.number(folder + "/latency");
       if (subject.machine.number(folder + "/disable") == 0) longest = std::max(longest, latency);
     }
