@@ -36,7 +36,7 @@ class OverheadsReader : private yaml::ValueReader {
   void read_overheads() {
     const Node *node = find(root_, "overheads");
     if (node == nullptr) {
-      error(root_, "the key 'overheads' is missing", "'redag calibrate --out FILE' writes an overheads file");
+      error(root_, "the key 'overheads' is missing", "'redag doctor --measure --out FILE' writes an overheads file");
       return;
     }
     if (!check_map(*node, "overheads", {"realtime", "normal"})) return;
@@ -133,10 +133,11 @@ Result<Overheads> Calibration::of(bool realtime_threads) const {
   const std::optional<Overheads> &found = realtime_threads ? realtime : normal;
   if (found) return *found;
   return realtime_threads
-             ? make_error("the calibration has no overheads of SCHED_FIFO threads",
-                          "run 'redag calibrate' in a process that may use SCHED_FIFO, or use --preemption cooperative "
-                          "or none")
-             : make_error("the calibration has no overheads of ordinary threads", "run 'redag calibrate' again");
+             ? make_error(
+                   "the calibration has no overheads of SCHED_FIFO threads",
+                   "run 'redag doctor --measure' in a process that may use SCHED_FIFO, or use --preemption cooperative "
+                   "or none")
+             : make_error("the calibration has no overheads of ordinary threads", "run 'redag doctor --measure' again");
 }
 
 std::string to_yaml(const Calibration &calibration) {

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What a machine adds to the jobs of a workload, as `redag calibrate` measures it (docs/calibration.md). Plain values,
-// without knowledge of how they are measured or charged. Pure functions.
+// What a machine adds to the jobs of a workload, as `redag doctor --measure` measures it (docs/calibration.md). Plain
+// values, without knowledge of how they are measured or charged. Pure functions.
 #pragma once
 
 #include <cstdint>

@@ -126,7 +126,7 @@ Result<Setup> set_up(const SetupRequest &request) {
   if (const auto throttling = os ? realtime_throttling() : std::nullopt) {
     setup.warnings.push_back(
         fmt::format("real-time throttling is on: SCHED_FIFO threads get at most {} of every {} us of a busy processor "
-                    "(turn it off with 'sysctl kernel.sched_rt_runtime_us=-1')",
+                    "('redag doctor' says what that means)",
                     throttling->runtime_us, throttling->period_us));
   }
   return setup;

@@ -249,15 +249,13 @@ int fifo_priority_above_this_thread() {
 }
 
 const char *realtime_hint() {
-  return "allow real-time priorities: 'setcap cap_sys_nice+ep PROGRAM'; or 'rtprio 90' for the user in "
-         "/etc/security/limits.conf, then log in again; or 'docker run --cap-add=SYS_NICE --ulimit rtprio=90'";
+  return "allow real-time priorities up to 90 (rtprio, CAP_SYS_NICE): 'redag doctor' says how";
 }
 
 Result<void> lock_memory() {
   if (mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0) return {};
-  return make_error(
-      "memory cannot be locked: " + reason(errno),
-      "raise the limit: 'memlock unlimited' in /etc/security/limits.conf, or 'docker run --ulimit memlock=-1'");
+  return make_error("memory cannot be locked: " + reason(errno),
+                    "raise the limit on locked memory (memlock): 'redag doctor' says how");
 }
 
 std::optional<Throttling> realtime_throttling() {

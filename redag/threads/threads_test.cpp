@@ -229,7 +229,7 @@ TEST(ResolveMode, AutoTakesOsWhereItCanAndSaysWhy) {
 TEST(ResolveMode, OsWithoutRightsIsAnErrorThatSaysHowToGetThem) {
   const auto refused = resolve_mode(PreemptionMode::Os, PolicyKind::RateMonotonic, {});
   ASSERT_FALSE(refused);
-  for (const char *way : {"setcap cap_sys_nice", "limits.conf", "--cap-add=SYS_NICE"}) {
+  for (const char *way : {"rtprio", "CAP_SYS_NICE", "redag doctor"}) {
     EXPECT_NE(refused.error()[0].hint.find(way), std::string::npos) << way;
   }
   const auto dynamic = resolve_mode(PreemptionMode::Os, PolicyKind::Fifo, kBand);

@@ -372,7 +372,7 @@ std::vector<Remark> remarks(const AssumptionCheck &check, const Workload &worklo
 }
 
 const char *not_calibrated_hint() {
-  return "overheads of the platform are not charged; measure them with 'redag calibrate' and charge them with "
+  return "overheads of the platform are not charged; measure them with 'redag doctor --measure' and charge them with "
          "--overheads";
 }
 

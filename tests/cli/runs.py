@@ -7,6 +7,7 @@
 Usage: runs.py PROGRAM SOURCE_DIR. Uses the standard library only.
 """
 import csv
+import ctypes
 import json
 import os
 import re
@@ -20,13 +21,67 @@ from pftrace import Picture
 from program import CART, PROGRAM, SOURCE, Case, body, in_terminal, interrupt, main, redag
 
 
-class Calibrate(Case):
-    def calibrated(self, *arguments):
+class Doctor(Case):
+    def measured(self, *arguments):
+        """Measures. The exit status depends on the machine."""
         path = self.folder / "overheads.yaml"
-        return path, self.expect(redag("calibrate", "--duration", "1s", "--out", path, *arguments), 0).stdout
+        result = redag("doctor", "--measure", "1s", "--out", path, *arguments)
+        self.assertIn(result.returncode, (0, 1), result.stderr)
+        return path, result.stdout
+
+    def test_each_line_has_a_colour(self):
+        result = redag("doctor")
+        lines = re.findall(r"(?m)^(green|yellow|red|unknown) +([^:]+): .", result.stdout)
+        self.assertLessEqual({"real-time right", "throttling", "clock source", "swap"}, {name for _, name in lines})
+        self.assertEqual(result.returncode, 1 if "red" in dict(map(reversed, lines)).values() else 0, result.stdout)
+        document = json.loads(redag("doctor", "--json").stdout)
+        self.assertEqual(document["format"], "redag.doctor/1")
+        self.assertEqual([(line["verdict"], line["name"]) for line in document["lines"]], lines)
+        for line in document["lines"]:
+            self.assertTrue(line["why"] and line["mend"] and line["found"], line)
+        self.assertEqual(sum(document[colour] for colour in ("green", "yellow", "red", "unknown")), len(lines))
+
+    def test_without_rights_it_is_red(self):
+        def without():
+            resource.setrlimit(resource.RLIMIT_RTPRIO, (0, 0))
+            ctypes.CDLL(None).prctl(24, 23, 0, 0, 0)  # PR_CAPBSET_DROP, CAP_SYS_NICE
+        result = subprocess.run([PROGRAM, "doctor"], capture_output=True, text=True, check=False, preexec_fn=without)
+        self.assertEqual(result.returncode, 1, result.stdout)
+        self.assertRegex(result.stdout, r"(?m)^red +real-time right: SCHED_FIFO is not allowed$")
+        self.assertIn("rtprio 95", result.stdout)
+
+    def test_lines_fit_a_terminal(self):
+        status, text = in_terminal("doctor", columns=80)
+        self.assertIn(status, (0, 1))
+        self.assertIn("\x1b[", text)
+        plain = re.sub(r"\x1b\[[0-9;]*m", "", text).replace("\r", "")
+        self.assertEqual(plain, redag("doctor", env={**os.environ, "COLUMNS": "80"}).stdout)
+        for line in plain.splitlines():
+            self.assertTrue(len(line) <= 80 or " " not in line.strip(), line)
+
+    def test_a_running_process(self):
+        workload = self.write("robot.yaml", CART.replace("name: cart", "name: attached"))
+        with subprocess.Popen([PROGRAM, "run", workload, "--duration", "300s"], stdout=subprocess.DEVNULL,
+                              stderr=subprocess.DEVNULL) as process:
+            deadline = time.monotonic() + 60
+            while str(process.pid) not in redag("top", "--list").stdout:
+                self.assertLess(time.monotonic(), deadline)
+                time.sleep(0.05)
+            document = json.loads(redag("doctor", "--attach", process.pid, "--json").stdout)
+            text = redag("doctor", "--attach", process.pid).stdout
+            process.kill()
+        self.assertEqual(document["processes"], [str(process.pid)])
+        self.assertIn("redag-timer", [thread["name"] for thread in document["threads"]])
+        found = {line["name"]: line["found"] for line in document["lines"]}
+        self.assertRegex(found["live page"], "^attached: preemption none, 1 worker, ")
+        self.assertNotIn("middleware", found)
+        self.assertIn("redag-timer", text)
+        self.expect(redag("doctor", "--attach", process.pid), 2, "there is no process")
 
     def test_a_file_that_the_others_charge(self):
-        path, text = self.calibrated()
+        path, text = self.measured()
+        self.assertIn("wake-up latency: median ", text)
+        self.assertRegex(text, r"(?m)^ *\d[\d.]*[mu]?s +\d[\d ]* +#+$")
         measured = set(re.findall(r"(?m)^    (\w+): [1-9]", path.read_text()))
         self.assertLessEqual({"clock", "lateness", "dispatch", "preempt", "timer", "stall"}, measured)
         self.assertIn("overheads charged on ordinary threads: timer ", text)
@@ -56,25 +111,30 @@ class Calibrate(Case):
 
     def test_without_one_the_run_says_so(self):
         result = self.expect(redag("run", self.cart, "--duration", "200ms", "--preemption", "none"), 0)
-        self.assertIn("overheads of the platform are not charged; measure them with 'redag calibrate'", result.stdout)
+        self.assertIn("overheads of the platform are not charged; measure them with 'redag doctor --measure'", result.stdout)
 
     def test_bad_files(self):
         self.expect(redag("run", self.cart, "--overheads", self.folder / "none.yaml"), 2, "cannot open")
         wrong = self.write("wrong.yaml", "overheads:\n  normal: {timer: 1us, dispach: 2us}\n")
         self.expect(redag("analyze", self.cart, "--overheads", wrong), 2, "wrong.yaml:2:", "did you mean 'dispatch'")
-        path, _ = self.calibrated()
+        path, _ = self.measured()
         self.expect(redag("analyze", self.cart, "--overheads", path, "--overhead-dispatch", "1us"), 2, "excludes")
         normal = self.write("normal.yaml", re.sub(r"  realtime:\n(    .*\n)+", "", path.read_text()))
         self.expect(redag("analyze", self.cart, "--preemption", "os", "--overheads", normal), 2, "SCHED_FIFO")
 
     def test_bad_arguments(self):
-        self.expect(redag("calibrate", "--duration", "0"), 2, "--duration")
-        self.expect(redag("calibrate", "--duration", "200h"), 2, "longer than a day")
-        self.expect(redag("calibrate", "--duration", "1s", "--out", self.folder / "no" / "folder.yaml"), 2, "folder.yaml")
+        self.expect(redag("doctor", "--measure", "0"), 2, "--measure")
+        self.expect(redag("doctor", "--measure", "5"), 2, "--measure", "no unit")
+        self.expect(redag("doctor", "--measure="), 2, "--measure: the value is empty", "redag doctor --help")
+        self.expect(redag("doctor", "--measure", "200h"), 2, "longer than a day")
+        self.expect(redag("doctor", "--measure", "1s", "--out", self.folder / "no" / "folder.yaml"), 2, "folder.yaml")
+        self.expect(redag("doctor", "--out", "overheads.yaml"), 2, "--measure")
+        for pid in ("0", "-1", "x", "1x", "9" * 30):
+            self.expect(redag("doctor", f"--attach={pid}"), 2, "--attach", "is not the number of a process")
 
     def test_interrupted_it_writes_nothing(self):
         path = self.write("before.yaml", "of an earlier calibration\n")
-        with subprocess.Popen([PROGRAM, "calibrate", "--duration", "10min", "--out", path], text=True,
+        with subprocess.Popen([PROGRAM, "doctor", "--measure", "10min", "--out", path], text=True,
                               stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
             interrupt(process, after=2)
             out, error = process.communicate(timeout=60)
@@ -345,7 +405,7 @@ class Interrupts(Case):
             result = subprocess.run(command, capture_output=True, text=True, check=True, preexec_fn=prepare)
             if prepare and os.geteuid() != 0:
                 self.assertIn("memory cannot be locked", result.stderr)
-                self.assertIn("memlock unlimited", result.stderr)
+                self.assertIn("redag doctor", result.stderr)
 
     def test_run_is_finished_and_written(self):
         out = self.folder / "out"

@@ -13,7 +13,7 @@ import subprocess
 
 from program import CART, MISTAKEN, PROGRAM, SOURCE, Case, main, redag
 
-COMMANDS = [["validate"], ["generate"], ["import"], ["simulate"], ["run"], ["calibrate"], ["compare"], ["analyze"], ["tune"],
+COMMANDS = [["validate"], ["generate"], ["import"], ["simulate"], ["run"], ["doctor"], ["compare"], ["analyze"], ["tune"],
             ["events"], ["why"], ["top"], ["serve"], ["report"], ["experiment"]]
 
 

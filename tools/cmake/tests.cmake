@@ -15,12 +15,12 @@ set(sim redag_analysis/sim)
 set(text redag_analysis/text)
 set(analysis redag_analysis/core redag_analysis/one_worker redag_analysis/many_workers
   redag_analysis/peers redag_analysis/analyze)
-foreach(group IN ITEMS workload run search report experiment robot import cli)
+foreach(group IN ITEMS workload run search report experiment robot import doctor cli)
   set(${group} redag_lab/${group})
 endforeach()
 set(testing tests/testing)
 set(test_groups base live model sched trace runtime executors metrics sim text analysis workload run search report experiment
-  robot import cli testing)
+  robot import doctor cli testing)
 
 redag_sources(testing_sources tests/testing)
 add_library(redag_testing STATIC ${testing_sources})

@@ -48,7 +48,7 @@ std::string advice(Cause cause, const Setting &at) {
   const std::string &x = at.x;
   const char *its = at.is_several ? "their" : "its";
   const std::string of_dag = at.dag.empty() ? "of the DAG" : "of " + at.dag;
-  constexpr const char *kMachine = "look at the machine: redag calibrate, isolated processors, a real-time kernel";
+  constexpr const char *kMachine = "look at the machine: redag doctor";
   switch (cause) {
     case Cause::ReleaseLate:
       return at.is_simulated ? "reduce the jitter of the timer, or lengthen the deadline" : kMachine;

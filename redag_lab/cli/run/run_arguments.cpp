@@ -49,7 +49,7 @@ CLI::Option *add_calibration_argument(CLI::App &app, RunArguments &arguments, co
   };
   return app
       .add_option_function<std::string>("--overheads", read,
-                                        "Charge the overheads of the machine that 'redag calibrate' measured")
+                                        "Charge the overheads of the machine that 'redag doctor --measure' measured")
       ->type_name("FILE")
       ->group(group);
 }

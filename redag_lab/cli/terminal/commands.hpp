@@ -24,7 +24,7 @@ Action add_generate(CLI::App &app);
 Action add_import(CLI::App &app);
 Action add_simulate(CLI::App &app);
 Action add_run(CLI::App &app);
-Action add_calibrate(CLI::App &app);
+Action add_doctor(CLI::App &app);
 Action add_compare(CLI::App &app);
 Action add_analyze(CLI::App &app);
 Action add_tune(CLI::App &app);

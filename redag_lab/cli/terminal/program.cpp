@@ -47,9 +47,10 @@ constexpr std::array kCommands = {
           "  redag run workloads/robot.yaml --duration 10s\n"
           "  sudo redag run workloads/robot.yaml --preemption os --out results/os\n"
           "  redag run workloads/robot.yaml --executor ste --check || echo 'missed'\n"},
-    Entry{"calibrate", "Measure the overheads of this machine, for bounds that hold on it", add_calibrate,
-          "  redag calibrate\n"
-          "  sudo redag calibrate --duration 5min --out overheads.yaml\n"},
+    Entry{"doctor", "Say whether this machine keeps real-time promises; measure what it adds", add_doctor,
+          "  redag doctor\n"
+          "  redag doctor --attach 1234\n"
+          "  sudo redag doctor --measure 5min --out overheads.yaml\n"},
     Entry{"compare", "Compare several executors on the same jobs, or two recorded results", add_compare,
           "  redag compare workloads/robot.yaml\n"
           "  redag compare workloads/robot.yaml --executors redag,mte --out results/cmp\n"
@@ -190,6 +191,13 @@ int parse_and_run(const std::vector<std::string> &given, Console &console) {
     return usage_error(console, fmt::format("unknown command {} ({})", in_quotes(first), suggestion(first, names)), "");
   }
 
+  for (const std::string &argument :
+       arguments) {  // CLI11 takes it for an option without a value, where it may have none
+    if (argument.size() > 3 && argument.compare(0, 2, "--") == 0 && argument.find('=') == argument.size() - 1) {
+      return usage_error(console, argument.substr(0, argument.size() - 1) + ": the value is empty",
+                         first.front() == '-' ? "" : first);
+    }
+  }
   const CLI::App *command = nullptr;
   const auto fail = [&](const std::string &message) {
     return usage_error(console, message, command == nullptr ? "" : command->get_name());

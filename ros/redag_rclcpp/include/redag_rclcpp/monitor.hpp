@@ -42,7 +42,7 @@ struct MonitorOptions {
   /// needs ReDAGOptions::trace_capacity.
   std::optional<redag::Workload> workload{};
 
-  /// Overheads of this machine, measured by `redag calibrate` and charged to the bounds. Empty: no overheads are
+  /// Overheads of this machine, measured by `redag doctor --measure` and charged to the bounds. Empty: no overheads are
   /// charged.
   std::optional<redag::Calibration> calibration{};
 };

@@ -17,11 +17,11 @@ namespace {
 constexpr std::int64_t kMostTraceEvents = 1'000'000'000;
 
 std::optional<redag::Calibration> read_overheads(ParameterReader &reader) {
-  const std::string path = reader.text(
-      {"overheads",
-       "File of overheads that `redag calibrate` measured on this machine; they are charged to the bounds; empty: none",
-       "the path of an overheads file (docs/calibration.md)"},
-      "");
+  const std::string path = reader.text({"overheads",
+                                        "File of overheads that `redag doctor --measure` measured on this machine; "
+                                        "they are charged to the bounds; empty: none",
+                                        "the path of an overheads file (docs/calibration.md)"},
+                                       "");
   if (path.empty()) return std::nullopt;
   redag::Result<redag::Calibration> loaded = redag::load_calibration(path);
   if (!loaded) {

@@ -70,7 +70,7 @@ Parameters, with their defaults:
   trace_events 10000000  number of events kept for the trace
   save_path redag_workload.yaml
                          file to which ~/save writes the learned workload
-  overheads ""           file of overheads from 'redag calibrate'
+  overheads ""           overheads file of 'redag doctor --measure'
 
 Locks of the process inherit priority where real-time priorities are available.
 Set REDAG_PI=0 in the environment to turn this off.

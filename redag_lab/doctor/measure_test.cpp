@@ -1,16 +1,18 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag_lab/run/calibrate.hpp"
+#include "redag_lab/doctor/measure.hpp"
 
 #include <gtest/gtest.h>
 
 #include <atomic>
 
 #include "redag/loader/validate.hpp"
+#include "redag_lab/doctor/figures.hpp"
+#include "redag_lab/doctor/measured_jobs.hpp"
 #include "tests/testing/trace_builder.hpp"
 
-namespace redag::lab {
+namespace redag::doctor {
 namespace {
 
 constexpr Duration kUs = kMicrosecond;
@@ -61,14 +63,14 @@ TEST(FitLoss, AProcessorThatIsMostlyLostIsNotPromised) {
   EXPECT_EQ(loss.per_second, kSecond - kMs);
 }
 
-TEST(Calibration, ItsWorkloadIsValid) {
-  const Workload workload = calibration_workload(3);
+TEST(Measure, ItsWorkloadIsValid) {
+  const Workload workload = measured_workload(3);
   EXPECT_EQ(workload.task_count(), 6U);
   EXPECT_FALSE(has_errors(validate(workload))) << to_string(validate(workload));
 }
 
-TEST(Calibration, FiguresComeFromTheTrace) {
-  const Workload workload = calibration_workload(1);
+TEST(TraceFigures, ComeFromTheTrace) {
+  const Workload workload = measured_workload(1);
   const TaskId tick(0);
   const TaskId tock(1);
   const TaskId long_job(3);
@@ -92,7 +94,7 @@ TEST(Calibration, FiguresComeFromTheTrace) {
   EXPECT_EQ(figures.preempt[0].length, 70);
 }
 
-TEST(Calibration, WhatADispatchTakesBeyondTheUsualIsAStall) {
+TEST(Measure, WhatADispatchTakesBeyondTheUsualIsAStall) {
   std::vector<LossSample> delays;
   for (int i = 1; i <= 200; ++i) delays.push_back({i * kMs, i == 100 ? 500 * kUs : 20 * kUs});
   Loss beyond;
@@ -101,11 +103,14 @@ TEST(Calibration, WhatADispatchTakesBeyondTheUsualIsAStall) {
   EXPECT_EQ(beyond.per_second, 960 * kUs);
 }
 
-TEST(Calibration, MeasuresOrdinaryThreadsEverywhere) {
-  CalibrateOptions options;
+TEST(Measure, MeasuresOrdinaryThreadsEverywhere) {
+  MeasureOptions options;
   options.duration = kSecond;
-  const Result<redag::Calibration> calibration = calibrate(options);
-  ASSERT_TRUE(calibration) << to_string(calibration.error());
+  const Result<Measurement> measured = measure(options);
+  ASSERT_TRUE(measured) << to_string(measured.error());
+  const Calibration *const calibration = &measured->calibration;
+  EXPECT_GT(measured->wake_ups.total(), 10U);
+  EXPECT_GT(measured->wake_ups.longest(), 0);
   EXPECT_TRUE(calibration->complete);
   ASSERT_TRUE(calibration->normal);
   const Overheads &normal = *calibration->normal;
@@ -118,15 +123,15 @@ TEST(Calibration, MeasuresOrdinaryThreadsEverywhere) {
   EXPECT_LE(normal.noise.per_second, normal.stall.per_second);
 }
 
-TEST(Calibration, EndsWhenTold) {
+TEST(Measure, EndsWhenTold) {
   std::atomic<bool> stop{true};
-  CalibrateOptions options;
+  MeasureOptions options;
   options.duration = 3600 * kSecond;
   options.stop = &stop;
-  const Result<redag::Calibration> calibration = calibrate(options);
-  ASSERT_FALSE(calibration);
-  EXPECT_NE(to_string(calibration.error()).find("interrupted"), std::string::npos);
+  const Result<Measurement> measured = measure(options);
+  ASSERT_FALSE(measured);
+  EXPECT_NE(to_string(measured.error()).find("interrupted"), std::string::npos);
 }
 
 }  // namespace
-}  // namespace redag::lab
+}  // namespace redag::doctor
