@@ -135,7 +135,7 @@ class Importing {
     Replay replay;
     replay.responses = unit.response.distribution();
     for (const EndedRun &run : unit.runs) {
-      replay.demands.push_back(run.execution + std::max<Duration>(run.wake_up.value_or(0) - result_.overhead, 0));
+      replay.demands.push_back(run.execution + run.delay.value_or(result_.overhead));
     }
     if (task.activation == Activation::Data) return replay;
     const CallbackRecord &first = first_of(unit);

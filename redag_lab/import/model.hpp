@@ -17,7 +17,7 @@ namespace redag::lab {
 /// What a simulation of the recorded run repeats of a task.
 struct Replay {
   Duration phase = 0;
-  std::vector<Duration> demands;    // of its jobs in order, with the wake-up of a thread where one was seen
+  std::vector<Duration> demands;    // of its jobs in order: executions, and what delayed them but other callbacks
   std::vector<Duration> gaps;       // of events in order: from the shortest distance to the one seen
   metrics::Distribution responses;  // without values where no event says when a job was released
 };

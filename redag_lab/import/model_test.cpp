@@ -387,8 +387,8 @@ TEST_F(Import, TellsWakeUpsFromWaiting) {
   EXPECT_EQ(imported.wake_ups.count, 100U);
   EXPECT_EQ(imported.wake_ups.p50, 80'000);
   EXPECT_EQ(imported.overhead, 7000);
-  EXPECT_EQ(imported.replays[0].demands, std::vector<Duration>(100, kMs + 73'000));
-  EXPECT_EQ(imported.replays[1].demands, std::vector<Duration>(100, kMs));
+  EXPECT_EQ(imported.replays[0].demands, std::vector<Duration>(100, kMs + 80'000));
+  EXPECT_EQ(imported.replays[1].demands, std::vector<Duration>(100, kMs + 7000));
 }
 
 // A response counts from the message that was taken, though a later one was sent before the callback began.

@@ -130,23 +130,20 @@ void Recording::start(const RosEvent &event) {
   const auto released = position == kUnknown ? std::nullopt : release_of(position, thread, event.time);
   thread.taken_by = kUnknown;
   Node *node = position == kUnknown ? nullptr : node_of(position);
-  std::optional<Duration> wake_up;
-  if (released) wake_up = note_delay(*released, event.time, thread, node);
+  std::optional<Duration> delay;
+  if (released) delay = note_delay(*released, event.time, thread, node);
   if (node != nullptr) ++node->running;
-  thread.runs.push_back({event.handle, position, node, event.time, released, wake_up, thread.absent, 0, {}});
+  thread.runs.push_back({event.handle, position, node, event.time, released, delay, thread.absent, 0, {}});
 }
 
-/// Returns the delay of a run whose thread and node were idle: nothing but the machine delayed it.
+/// Returns by how much the executor and the machine delayed a run: other callbacks of its thread and node did not.
 std::optional<Duration> Recording::note_delay(Time released, Time start, Thread &thread, const Node *node) {
-  ProcessRecord &process = *thread.process;
   if (!thread.runs.empty()) return std::nullopt;  // another callback called it
-  if (released < thread.last_end) {
-    process.turnarounds.add(start - thread.last_end);
-    return std::nullopt;
-  }
-  if (node == nullptr || node->running > 0 || released < node->last_end) return std::nullopt;
-  process.wake_ups.add(start - released);
-  return start - released;
+  if (node == nullptr || node->running > 0) return std::nullopt;
+  const Time free = std::max({released, thread.last_end, node->last_end});
+  ProcessRecord &process = *thread.process;
+  (free == released ? process.wake_ups : process.turnarounds).add(start - free);
+  return start - free;
 }
 
 Recording::Node *Recording::node_of(std::size_t callback) {
@@ -232,7 +229,7 @@ void Recording::end(const RosEvent &event) {
   Runs &runs = run.sent.empty() ? callback.quiet : callback.publishing;
   runs.execution.add(own);
   if (callback.ended.size() < kMostRuns) {
-    callback.ended.push_back({run.start, own, run.wake_up, !run.sent.empty()});
+    callback.ended.push_back({run.start, own, run.delay, !run.sent.empty()});
   }
   if (run.released) runs.response.add(event.time - *run.released);
   for (const Sent &sent : run.sent) {

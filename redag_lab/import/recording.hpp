@@ -38,7 +38,7 @@ struct Runs {
 struct EndedRun {
   Time start = 0;
   Duration execution = 0;
-  std::optional<Duration> wake_up;  // from release to begin, if its thread and its node were idle in between
+  std::optional<Duration> delay;  // until it began, after its release, and when its thread and its node were free
   bool publishes = false;
 };
 
@@ -78,8 +78,8 @@ struct ProcessRecord {
   Duration executed = 0;
   std::uint64_t unknown_runs = 0;             // of callbacks whose creation was not recorded
   std::uint64_t torn_runs = 0;                // begin or end is missing
-  metrics::DurationSketch wake_ups{1024};     // of runs, as in EndedRun
-  metrics::DurationSketch turnarounds{1024};  // from the end of a run to the begin of one that waited for its thread
+  metrics::DurationSketch wake_ups{1024};     // delays of runs whose thread and node were idle
+  metrics::DurationSketch turnarounds{1024};  // of the others
 };
 
 class Recording {
@@ -118,7 +118,7 @@ class Recording {
     Node *node = nullptr;  // of the callback, if known
     Time start = 0;
     std::optional<Time> released;
-    std::optional<Duration> wake_up;
+    std::optional<Duration> delay;
     Duration absent = 0;  // of the thread, when the run began
     Duration inner = 0;   // execution of callbacks that this run called
     std::vector<Sent> sent;

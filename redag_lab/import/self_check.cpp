@@ -36,7 +36,6 @@ Replayed replay(const ImportedWorkload &imported, const Workload &workload) {
   SessionOptions &options = replayed.options;
   options.duration = std::clamp<Duration>(imported.length, kSecond, kLongest);
   options.keep_trace = false;
-  options.overheads.dispatch = imported.overhead;
   const auto nth = [](const std::vector<Duration> &values, std::uint32_t number) {
     return values.empty() ? 0 : values[number % values.size()];
   };

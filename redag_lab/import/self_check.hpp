@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Asks whether an imported workload does in the simulator what the robot did: the model of the executor that ran, with
-// the phases, executions and wake-ups of the recording, against the recorded response times. Prints nothing.
+// the phases, executions and delays of the recording, against the recorded response times. Prints nothing.
 #pragma once
 
 #include <string>

@@ -7,6 +7,7 @@
 Usage: imports.py PROGRAM SOURCE_DIR. Uses the standard library only.
 """
 import json
+import os
 import re
 import shutil
 import sys
@@ -50,11 +51,11 @@ class Import(Case):
         self.assertRegex(result.stdout, r"The model of mte reproduces \d+ of \d+ recorded responses")
 
     def test_the_verdict(self):
-        result = redag("import", RECORDING, "--verdict")
+        result = redag("import", RECORDING, "--verdict", env={**os.environ, "COLUMNS": "80"})
         self.assertIn(result.returncode, (0, 1), result.stderr)
         said = result.stdout
-        self.assertEqual([line for line in said.splitlines() if len(line) > 80 and line.startswith("/")], [])
-        for words in (r"callback +executor +p50 +p99 +missed +shown", r"(?m)^mte on \d+: .* deadlines shown, largest p99",
+        self.assertEqual([line for line in said.splitlines() if len(line) > 80], [])
+        for words in (r"callback +by +p50 +p99 +missed +shown +1: p99 +1: miss", r"(?m)^mte on \d+: .* deadlines shown, largest p99",
                       r"(?m)^os on \d+: ", r"What would help most|No single change"):
             self.assertRegex(said, words)
         document = json.loads(redag("import", RECORDING, "--verdict", "--json", "--workers", 3).stdout)
@@ -67,7 +68,7 @@ class Import(Case):
     def test_a_robot_that_is_in_time(self):
         write_trace(self.folder / "fine", lidar().events)
         said = self.expect(redag("import", self.folder / "fine", "--verdict"), 0).stdout
-        self.assertIn("ste on 1: none missed, 1 of 1 deadlines shown, largest p99 40 % of its deadline", said)
+        self.assertIn("ste on 1: none missed, 1 of 1 deadlines shown, largest p99 40.0 % of its deadline", said)
 
     def test_processor_time(self):
         """With the kernel's events, the time without a processor is no execution."""
@@ -105,7 +106,7 @@ class Import(Case):
     def test_sessions_of_other_clocks(self):
         write_trace(self.folder / "two" / "one", lidar().events)
         write_trace(self.folder / "two" / "other", lidar(process=2).events, clock="other")
-        self.expect(redag("import", self.folder / "two"), 2, "cannot read the recording", "clock")
+        self.expect(redag("import", self.folder / "two"), 2, "cannot read the recording")
 
     def test_many_callbacks(self):
         robot = Robot()
@@ -115,7 +116,7 @@ class Import(Case):
             for at, timer in enumerate(timers[:500]):
                 robot.run(7, timer, k * 10 * MS + at * 1000, 900)
         write_trace(self.folder / "many", robot.events)
-        self.assertIn("19500 callbacks that never ran", self.expect(redag("import", self.folder / "many"), 0).stdout)
+        self.assertIn("19 500 callbacks that never ran", self.expect(redag("import", self.folder / "many"), 0).stdout)
 
     def test_a_robot_file_of_several_processes(self):
         folder, robot = self.folder / "both", self.folder / "robot.yaml"

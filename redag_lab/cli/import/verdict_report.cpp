@@ -8,12 +8,14 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "redag/base/text.hpp"
 #include "redag/base/words.hpp"
 #include "redag_analysis/text/table.hpp"
+#include "redag_analysis/text/tint.hpp"
 
 namespace redag::cli {
 namespace {
@@ -59,13 +61,20 @@ std::vector<Line> lines_of(const lab::Verdict &verdict, const Workload &workload
       Line &line = lines.emplace_back();
       for (const Outcome &outcome : verdict.outcomes) {
         const metrics::SinkSummary &end = outcome.summary.dags[dag].end_to_end.sinks[sink];
-        line.name = "age at the end of " + tasks[end.task.value - first].name;
+        line.name = "age at " + tasks[end.task.value - first].name;
         line.figures.push_back({&end.response, nullptr, false});
       }
     }
     first += tasks.size();
   }
   return lines;
+}
+
+/// Leaves room for the figures: they need 60 columns.
+std::string fitting_name(std::string name, std::size_t width) {
+  constexpr std::string_view kObvious = " subscription";
+  if (const std::size_t at = name.find(kObvious); at != std::string::npos) name.erase(at, kObvious.size());
+  return width == 0 ? name : cut(name, std::max<std::size_t>(width, 72) - 60);
 }
 
 std::string short_name(const Outcome &outcome) {
@@ -113,13 +122,13 @@ std::string describe(const lab::Verdict &verdict, const Workload &workload, cons
   const std::size_t executors = verdict.outcomes.size() / 2;
   const std::uint32_t other = verdict.outcomes[executors].workers;
   Table table({{.title = "callback", .importance = 9},
-               {.title = "executor", .importance = 9},
+               {.title = "by", .importance = 9},
                {"p50", true, 5},
                {"p99", true, 7},
                {"missed", true, 8},
                {.title = "shown", .importance = 6},
                {fmt::format("{}: p99", other), true, 3},
-               {fmt::format("{}: missed", other), true, 4}});
+               {fmt::format("{}: miss", other), true, 4}});
   for (const Line &line : lines_of(verdict, workload)) {
     for (std::size_t i = 0; i < executors; ++i) {
       const auto missed = [](const Figures &figures) {
@@ -129,7 +138,7 @@ std::string describe(const lab::Verdict &verdict, const Workload &workload, cons
       };
       const Figures &now = line.figures[i];
       const Figures &then = line.figures[i + executors];
-      table.add({{i == 0 ? line.name : ""},
+      table.add({{i == 0 ? fitting_name(line.name, terminal.width) : ""},
                  {short_name(verdict.outcomes[i])},
                  {humanize_duration(now.response->p50)},
                  {humanize_duration(now.response->p99)},
