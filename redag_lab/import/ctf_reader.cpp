@@ -38,6 +38,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::uint64_t kMostCpus = 1024;  // of a robot file
+
 template <auto Put>
 struct Release {
   template <class T>
@@ -241,12 +243,17 @@ class Sink {
     RosEvent found;
     found.kind = name->kind;
     const bt_stream_class *stream = bt_stream_borrow_class_const(bt_event_borrow_stream_const(event));
-    if (bt_stream_class_borrow_default_clock_class_const(stream) == nullptr ||
-        bt_clock_snapshot_get_ns_from_origin(bt_message_event_borrow_default_clock_snapshot_const(message),
-                                             &found.time) != BT_CLOCK_SNAPSHOT_GET_NS_FROM_ORIGIN_STATUS_OK) {
+    const bool has_clock = bt_stream_class_borrow_default_clock_class_const(stream) != nullptr;
+    const bt_clock_snapshot *clock =
+        has_clock ? bt_message_event_borrow_default_clock_snapshot_const(message) : nullptr;
+    if (clock == nullptr ||
+        bt_clock_snapshot_get_ns_from_origin(clock, &found.time) != BT_CLOCK_SNAPSHOT_GET_NS_FROM_ORIGIN_STATUS_OK) {
       problem = "its events have no time";
       return;
     }
+    const bt_packet *packet = bt_event_borrow_packet_const(event);
+    const bt_field *of_packet = packet != nullptr ? bt_packet_borrow_context_field_const(packet) : nullptr;
+    read.cpus = std::max(read.cpus, std::min<std::uint64_t>(number_in(of_packet, "cpu_id"), kMostCpus - 1) + 1);
     now_ = found.time;
     if (begin_ == 0) begin_ = now_;
     const bt_field *payload = bt_event_borrow_payload_field_const(event);
@@ -265,6 +272,10 @@ class Sink {
       found.third = number_in(payload, name->third);
       found.value = static_cast<std::int64_t>(number_in(payload, name->value));
       found.name = text_in(payload, name->text);
+      // CARET records objects again that were made before: with the clock of the events, but without its offset.
+      const std::uint64_t now = bt_clock_snapshot_get_value(clock);
+      const std::uint64_t created = number_in(payload, "init_timestamp");
+      if (created > 0 && created < now) found.created = found.time - static_cast<Duration>(now - created);
       if (name->kind == RosEvent::Kind::NodeInit) found.space = text_in(payload, "namespace");
       if (name->kind == RosEvent::Kind::Take && number_in(payload, "taken") == 0) found.value = 0;
       found.program = text_in(context, "procname");
@@ -276,8 +287,12 @@ class Sink {
     const auto [known, is_new] = names_.try_emplace(event, nullptr);
     const char *name = is_new ? bt_event_class_get_name(event) : nullptr;
     if (name != nullptr) {
-      const auto *found = std::find_if(kRosEventNames.begin(), kRosEventNames.end(),
-                                       [&](const RosEventName &ours) { return ours.name == name; });
+      std::string_view plain = name;
+      constexpr std::string_view kCaret = "ros2_caret:";  // also has events of ros2_tracing under its name
+      if (plain.starts_with(kCaret)) plain.remove_prefix(kCaret.size());
+      const auto *found = std::find_if(kRosEventNames.begin(), kRosEventNames.end(), [&](const RosEventName &ours) {
+        return ours.name == name || (plain != name && ours.name == "ros2:" + std::string(plain));
+      });
       if (found != kRosEventNames.end()) known->second = found;
     }
     return known->second;

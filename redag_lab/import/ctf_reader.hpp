@@ -19,6 +19,7 @@ struct ReadTrace {
   std::uint64_t lost = 0;    // events that the tracer could not keep
   bool lost_more = false;    // and others, in unknown number
   bool stopped = false;      // by `progress`
+  std::uint64_t cpus = 1;    // processors with events, and those before them
 };
 
 /// Called at times with the share of the recording that is read, from 0 to 1. Returns false to stop.

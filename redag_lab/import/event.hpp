@@ -29,12 +29,16 @@ struct RosEvent {
     Publish,               // handle: publisher
     IntraPublish,          // handle: publisher
     Take,                  // handle: subscription of rmw; value: when the message was sent, 0 if none was there
+    Dispatch,              // handle: callback of a subscription; value: when the message was sent (before Humble)
+    Group,                 // handle: callback group; name: its type (CARET)
+    GroupMember,           // handle: timer, subscription of rcl, or service; other: callback group (CARET)
     Executor,              // the thread is one of an executor
     Switch,                // of the kernel: thread `handle` leaves a processor, thread `other` gets it
   };
 
   Kind kind = Kind::Executor;
   Time time = 0;
+  Time created = 0;  // of an object that CARET recorded later; 0: at `time`
   std::uint32_t process = 0;
   std::uint32_t thread = 0;
   std::uint64_t handle = 0;
@@ -57,7 +61,8 @@ struct RosEventName {
   const char *text = nullptr;
 };
 
-/// The fields of ros2_tracing since Humble. A field that a distribution lacks stays 0.
+/// The fields of ros2_tracing since Galactic, and of CARET's additional events. A field that a distribution lacks stays
+/// 0.
 inline constexpr std::array kRosEventNames = {
     RosEventName{"ros2:rcl_node_init", RosEvent::Kind::NodeInit, "node_handle", nullptr, nullptr, nullptr, "node_name"},
     RosEventName{"ros2:rcl_publisher_init", RosEvent::Kind::PublisherInit, "publisher_handle", "node_handle", nullptr,
@@ -80,6 +85,16 @@ inline constexpr std::array kRosEventNames = {
     RosEventName{"ros2:rclcpp_intra_publish", RosEvent::Kind::IntraPublish, "publisher_handle"},
     RosEventName{"ros2:rmw_take", RosEvent::Kind::Take, "rmw_subscription_handle", nullptr, nullptr,
                  "source_timestamp"},
+    RosEventName{"ros2:dispatch_subscription_callback", RosEvent::Kind::Dispatch, "callback", nullptr, nullptr,
+                 "source_stamp"},
+    RosEventName{"ros2_caret:add_callback_group", RosEvent::Kind::Group, "callback_group_addr", nullptr, nullptr,
+                 nullptr, "group_type_name"},
+    RosEventName{"ros2_caret:callback_group_add_timer", RosEvent::Kind::GroupMember, "timer_handle",
+                 "callback_group_addr"},
+    RosEventName{"ros2_caret:callback_group_add_subscription", RosEvent::Kind::GroupMember, "subscription_handle",
+                 "callback_group_addr"},
+    RosEventName{"ros2_caret:callback_group_add_service", RosEvent::Kind::GroupMember, "service_handle",
+                 "callback_group_addr"},
     RosEventName{"ros2:rclcpp_executor_get_next_ready", RosEvent::Kind::Executor},
     RosEventName{"ros2:rclcpp_executor_wait_for_work", RosEvent::Kind::Executor},
     RosEventName{"ros2:rclcpp_executor_execute", RosEvent::Kind::Executor},

@@ -7,72 +7,47 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "redag/base/text.hpp"
 #include "redag/base/words.hpp"
 #include "redag/loader/workload_yaml.hpp"
 #include "redag_analysis/text/wrap.hpp"
+#include "redag_lab/import/units.hpp"
 
 namespace redag::lab {
 namespace {
 
 using CallbackKind = Callback::Kind;
-using Output = CallbackRecord::Output;
-using Positions = std::vector<std::size_t>;
 
-constexpr std::uint64_t kFewestRuns = 3;  // that tell a rate
 constexpr std::size_t kQuantiles = 20;
 constexpr std::size_t kColumns = 100;  // of comments
-constexpr double kEdges = 2;           // runs or messages that begin and end of a recording cut off
-constexpr double kAll = 0.95;          // of what is as many, but for a few that were lost
-constexpr double kMost = 0.5;          // a message that is overwritten is not taken
-
-bool is_at_least(std::uint64_t count, double share, std::uint64_t whole) {
-  return static_cast<double>(count) + kEdges >= share * static_cast<double>(whole);
-}
-bool is_as_many(std::uint64_t a, std::uint64_t b) { return is_at_least(a, kAll, b) && is_at_least(b, kAll, a); }
 
 std::string share_of(std::uint64_t part, std::uint64_t whole) {
   return format_percent(static_cast<double>(part) / static_cast<double>(whole));
 }
 
-/// Positions that belong together.
-class Clusters {
- public:
-  explicit Clusters(std::size_t count) : parents_(count) { std::iota(parents_.begin(), parents_.end(), 0); }
-  /// The least position of the cluster.
-  [[nodiscard]] std::size_t first(std::size_t position) const {
-    while (parents_[position] != position) position = parents_[position];
-    return position;
-  }
-  void join(std::size_t a, std::size_t b) { parents_[std::max(first(a), first(b))] = std::min(first(a), first(b)); }
-
- private:
-  Positions parents_;
-};
-
-/// What becomes a task: a callback, or several of a node that together make one job.
-struct Unit {
-  Positions members;  // in Recording::callbacks(); a timer is first
-  metrics::DurationSketch execution{1024};
-  metrics::DurationSketch response{1024};
-  Positions predecessors;  // units
-  std::vector<std::string> notes;
-};
+std::string unique_name(const std::string &wanted, std::set<std::string> &taken) {
+  std::string name = wanted;
+  for (int n = 2; !taken.insert(name).second; ++n) name = fmt::format("{}_{}", wanted, n);
+  return name;
+}
 
 class Importing {
  public:
   Importing(const Recording &recording, std::uint32_t pid)
-      : callbacks_(recording.callbacks()), recording_(recording), pid_(pid), process_(recording.processes().at(pid)) {}
+      : callbacks_(recording.callbacks()), recording_(recording), process_(recording.processes().at(pid)) {
+    Units found = find_units(recording, pid);
+    find_edges(recording, found.units);
+    units_ = std::move(found.units);
+    result_.left_out = std::move(found.left_out);
+    result_.messages = found.messages;
+    result_.explained = found.explained;
+  }
 
   ImportedWorkload run() {
-    for (std::size_t i = 0; i < callbacks_.size(); ++i) {
-      for (const auto &[topic, output] : callbacks_[i].outputs) publishers_[topic].push_back(i);
-    }
-    make_units(usable_callbacks());
-    for (std::size_t unit = 0; unit < units_.size(); ++unit) find_predecessors(unit);
-    open_circles();
+    result_.wake_ups = process_.wake_ups.distribution();
+    result_.overhead =
+        process_.turnarounds.size() >= kQuantiles ? process_.turnarounds.distribution().p50 : result_.wake_ups.min;
     make_dags();
     describe();
     return std::move(result_);
@@ -84,237 +59,7 @@ class Importing {
     return callbacks_[callback].id.kind == CallbackKind::Timer;
   }
 
-  // ---- callbacks ----
-
-  Positions usable_callbacks() {
-    Positions usable;
-    std::size_t never = 0;
-    std::uint64_t of_ros = 0;
-    for (std::size_t i = 0; i < callbacks_.size(); ++i) {
-      const CallbackRecord &callback = callbacks_[i];
-      if (callback.process != pid_) continue;
-      if (is_ros_internal(callback.id)) {
-        of_ros += callback.runs;
-        continue;
-      }
-      if (callback.id.kind == CallbackKind::Subscription) result_.messages += callback.runs;
-      const bool is_slow = is_timer(i) && callback.id.period > (recording_.last() - callback.created) / 10;
-      std::string why;
-      if (callback.id.node.empty()) {
-        why = "its node is unknown: the recording began later";
-      } else if (callback.quiet.execution.size() + callback.publishing.execution.size() == 0) {
-        why = "no run of it ended";
-      } else if (callback.runs < kFewestRuns && !is_slow) {
-        why = fmt::format("ran {}: its rate is unknown", plural(callback.runs, "time"));
-      }
-      if (callback.runs == 0) {
-        ++never;
-      } else if (why.empty()) {
-        usable.push_back(i);
-      } else {
-        result_.left_out.push_back(fmt::format("{}: {}", to_string(callback.id), why));
-      }
-    }
-    if (of_ros > 0)
-      result_.left_out.push_back(fmt::format("{} of ROS itself, such as parameters", plural(of_ros, "run")));
-    if (never > 0) result_.left_out.push_back(fmt::format("{} that never ran", plural(never, "callback")));
-    return usable;
-  }
-
-  /// True if these callbacks of a node can be one job: at most one timer, no service, and none beside another.
-  [[nodiscard]] bool can_be_one_job(const Positions &members) const {
-    const auto spoils = [&](std::size_t member) {
-      const CallbackRecord &callback = callbacks_[member];
-      return callback.id.kind == CallbackKind::Service || callback.most_at_once > 1 ||
-             std::any_of(members.begin(), members.end(), [&](auto other) { return callback.overlaps.contains(other); });
-    };
-    return members.size() > 1 && std::none_of(members.begin(), members.end(), spoils) &&
-           std::count_if(members.begin(), members.end(), [&](std::size_t i) { return is_timer(i); }) <= 1;
-  }
-
-  /// True if the callbacks store what they take until the last one of a round has it all, and publishes.
-  [[nodiscard]] bool publish_in_turn(const Positions &members, const std::string &topic) const {
-    std::uint64_t messages = 0;
-    std::uint64_t rounds = UINT64_MAX;
-    for (const std::size_t member : members) {
-      messages += callbacks_[member].outputs.at(topic).messages;
-      rounds = std::min(rounds, callbacks_[member].runs);
-    }
-    return messages >= kFewestRuns && is_as_many(messages, rounds);
-  }
-
-  /// The same where nothing is published: one run of each round is long, and not always that of the same callback.
-  /// Returns what separates long runs from others; 0: it is not so.
-  [[nodiscard]] Duration work_in_turn(const Positions &members) const {
-    Duration shortest = kNever;
-    Duration longest = 0;
-    std::uint64_t rounds = UINT64_MAX;
-    for (const std::size_t member : members) {
-      const metrics::Distribution execution = callbacks_[member].quiet.execution.distribution();
-      shortest = std::min(shortest, std::max<Duration>(execution.min, 1));
-      longest = std::max(longest, execution.max);
-      rounds = std::min(rounds, execution.count);
-    }
-    const auto limit = static_cast<Duration>(std::sqrt(static_cast<double>(shortest) * static_cast<double>(longest)));
-    std::uint64_t work = 0;
-    std::size_t changing = 0;
-    for (const std::size_t member : members) {
-      const std::uint64_t runs = callbacks_[member].quiet.execution.size();
-      const std::uint64_t long_runs = longer_than(limit, callbacks_[member].quiet.execution).size();
-      work += long_runs;
-      if (std::min(long_runs, runs - long_runs) >= kFewestRuns) ++changing;
-      if (!is_as_many(runs, rounds)) return 0;
-    }
-    return changing >= 2 && is_as_many(work, rounds) && longest >= 10 * shortest ? limit : 0;
-  }
-
-  static metrics::DurationSketch longer_than(Duration limit, const metrics::DurationSketch &all) {
-    metrics::DurationSketch result{1024};
-    const Duration longest = all.distribution().max;
-    for (const metrics::CountedDurations &range : all.counted()) {
-      for (std::uint64_t i = 0; range.low > limit && i < range.count; ++i) result.add(std::min(range.high, longest));
-    }
-    return result;
-  }
-
-  void make_units(const Positions &usable) {
-    Clusters jobs(callbacks_.size());
-    std::map<std::pair<std::string, std::string>, Positions> sets;  // by node, and topic that they publish to or ""
-    for (const std::size_t i : usable) {
-      for (const auto &[topic, output] : callbacks_[i].outputs) sets[{callbacks_[i].id.node, topic}].push_back(i);
-      if (callbacks_[i].outputs.empty() && !is_timer(i)) sets[{callbacks_[i].id.node, {}}].push_back(i);
-    }
-    std::map<std::size_t, Duration> limits;  // of jobs that publish nothing
-    for (const auto &[key, members] : sets) {
-      const std::string &topic = key.second;
-      if (!can_be_one_job(members) || (!topic.empty() && !publish_in_turn(members, topic))) continue;
-      if (topic.empty() && (limits[members.front()] = work_in_turn(members)) == 0) continue;
-      for (const std::size_t member : members) jobs.join(members.front(), member);
-    }
-    std::map<std::size_t, std::size_t> units;
-    for (const std::size_t callback : usable) {
-      const auto [unit, is_new] = units.try_emplace(jobs.first(callback), units_.size());
-      if (is_new) units_.emplace_back();
-      units_[unit->second].members.push_back(callback);
-      unit_of_[callback] = unit->second;
-    }
-    for (Unit &unit : units_) {
-      std::stable_partition(unit.members.begin(), unit.members.end(), [&](std::size_t i) { return is_timer(i); });
-      std::vector<std::string> names;
-      for (const std::size_t member : unit.members) {
-        const CallbackRecord &callback = callbacks_[member];
-        unit.execution.merge(callback.publishing.execution);
-        unit.response.merge(callback.publishing.response);
-        if (unit.members.size() == 1) {
-          unit.execution.merge(callback.quiet.execution);
-          unit.response.merge(callback.quiet.response);
-        }
-        if (const Duration limit = limits[unit.members.front()]; limit > 0) {
-          unit.execution.merge(longer_than(limit, callback.quiet.execution));
-        }
-        result_.explained += callback.executed;
-        names.push_back(is_timer(member) ? "its timer" : callback.id.name);
-      }
-      const metrics::Distribution execution = unit.execution.distribution();
-      unit.notes.push_back(fmt::format("wcet: the longest of {}; median {}, 99 % within {}",
-                                       plural(execution.count, "run"), humanize_duration(execution.p50),
-                                       humanize_duration(execution.p99)));
-      if (names.size() > 1)
-        unit.notes.push_back(fmt::format("one job of {}: the last of a round does it", join(names)));
-    }
-  }
-
-  // ---- edges ----
-
-  /// Returns the unit whose every job sends the one message that this callback takes. Otherwise notes why there is
-  /// none.
-  std::optional<std::size_t> sender_of(const CallbackRecord &taker, std::vector<std::string> &notes) const {
-    const std::string &topic = taker.id.name;
-    std::map<std::size_t, Output> senders;
-    bool others = recording_.is_sent_elsewhere(topic);
-    if (const auto publishers = publishers_.find(topic); publishers != publishers_.end()) {
-      for (const std::size_t i : publishers->second) {
-        const auto unit = unit_of_.find(i);
-        if (unit == unit_of_.end()) {
-          others = true;
-          continue;
-        }
-        senders[unit->second].runs += callbacks_[i].outputs.at(topic).runs;
-        senders[unit->second].messages += callbacks_[i].outputs.at(topic).messages;
-      }
-    }
-    if (senders.empty()) {
-      notes.push_back(taker.takes_directly && !others
-                          ? topic + " came from an unknown callback of this process: no event says who sent it"
-                          : topic + " comes from outside of the callbacks of this process");
-      return std::nullopt;
-    }
-    const auto &[unit, output] = *senders.begin();
-    const std::string name = to_string(first_of(units_[unit]).id);
-    std::string why;
-    if (senders.size() > 1 || others) {
-      why = fmt::format("{} has several publishers, {} among them: each message is one job", topic, name);
-    } else if (const std::uint64_t runs = units_[unit].execution.size();
-               !is_at_least(output.runs, kAll, runs) || !is_as_many(output.messages, output.runs)) {
-      why = fmt::format("{} publishes {} {} times in {} runs: a rate of its own", name, topic, output.messages, runs);
-    } else if (!is_as_many(taker.runs, output.messages)) {
-      why = fmt::format("took {} of {} messages of {}", taker.runs, output.messages, name);
-      if (is_at_least(taker.runs, kMost, output.messages)) {
-        notes.push_back(why);
-        return unit;
-      }
-    } else {
-      return unit;
-    }
-    notes.push_back(why);
-    return std::nullopt;
-  }
-
-  void find_predecessors(std::size_t position) {
-    Unit &unit = units_[position];
-    std::size_t known = 0;
-    std::size_t inputs = 0;
-    for (const std::size_t member : unit.members) {
-      if (callbacks_[member].id.kind != CallbackKind::Subscription) continue;
-      ++inputs;
-      const std::optional<std::size_t> sender = sender_of(callbacks_[member], unit.notes);
-      if (!sender || *sender == position) continue;
-      ++known;
-      if (std::find(unit.predecessors.begin(), unit.predecessors.end(), *sender) == unit.predecessors.end()) {
-        unit.predecessors.push_back(*sender);
-      }
-    }
-    if (known > 0 && known < inputs) unit.notes.emplace_back("unknown to the model: that it waits for the others, too");
-  }
-
-  void open_circles() {
-    std::vector<bool> done(units_.size(), false);
-    for (std::size_t left = units_.size(); left > 0;) {
-      const std::size_t before = left;
-      std::optional<std::size_t> earliest;
-      for (std::size_t i = 0; i < units_.size(); ++i) {
-        if (done[i]) continue;
-        const Positions &from = units_[i].predecessors;
-        if (std::all_of(from.begin(), from.end(), [&](std::size_t p) { return bool{done[p]}; })) {
-          done[i] = true;
-          --left;
-        } else if (!earliest || first_of(units_[i]).first_start < first_of(units_[*earliest]).first_start) {
-          earliest = i;
-        }
-      }
-      if (left != before || !earliest) continue;
-      units_[*earliest].predecessors.clear();
-      units_[*earliest].notes.emplace_back("its messages come around in a circle, which begins here in the model");
-    }
-  }
-
   // ---- tasks ----
-
-  static std::string unique(const std::string &wanted, std::set<std::string> &taken) {
-    std::string name = wanted;
-    for (int n = 2; !taken.insert(name).second; ++n) name = fmt::format("{}_{}", wanted, n);
-    return name;
-  }
 
   void make_dags() {
     Clusters dags(units_.size());
@@ -335,20 +80,17 @@ class Importing {
       const std::size_t source =
           *std::find_if(members.begin(), members.end(), [&](std::size_t i) { return units_[i].predecessors.empty(); });
       Dag dag;
-      dag.name = unique(first_of(units_[source]).id.node.substr(1), names);
+      dag.name = unique_name(first_of(units_[source]).id.node.substr(1), names);
       dag.edges = Edges::Seen;
       for (const std::size_t i : members) {
         Task task = make_task(units_[i]);
-        task.name = unique(task.name, names);
+        task.name = unique_name(task.name, names);
         for (const std::size_t p : units_[i].predecessors) {
           const auto at = std::find(members.begin(), members.end(), p) - members.begin();
           task.predecessors.push_back(static_cast<std::uint32_t>(at));
         }
         if (task.concurrency == 1) task.group = group_of(i, groups[first_of(units_[i]).id.node]);
-        const CallbackRecord &callback = first_of(units_[i]);
-        const Time begin = callback.id.period > 0 ? callback.created : callback.begun.front();
-        result_.phases.push_back(task.activation == Activation::Data ? 0 : (begin - recording_.first()) % task.period);
-        result_.responses.push_back(units_[i].response.distribution());
+        result_.replays.push_back(replay_of(units_[i], task));
         result_.notes.push_back(units_[i].notes);
         dag.tasks.push_back(std::move(task));
       }
@@ -389,6 +131,22 @@ class Importing {
     return task;
   }
 
+  [[nodiscard]] Replay replay_of(const Unit &unit, const Task &task) const {
+    Replay replay;
+    replay.responses = unit.response.distribution();
+    for (const EndedRun &run : unit.runs) {
+      replay.demands.push_back(run.execution + run.delay.value_or(result_.overhead));
+    }
+    if (task.activation == Activation::Data) return replay;
+    const CallbackRecord &first = first_of(unit);
+    const Time begin = first.id.period > 0 ? first.created : first.begun.front();
+    replay.phase = ((begin - recording_.first()) % task.period + task.period) % task.period;
+    for (std::size_t i = 1; task.phase == Phase::Event && i < first.begun.size(); ++i) {
+      replay.gaps.push_back(std::max<Duration>(first.begun[i] - first.begun[i - 1] - task.period, 0));
+    }
+    return replay;
+  }
+
   static Duration timer_period(const CallbackRecord &timer, std::vector<std::string> &notes) {
     const Duration stated = std::max<Duration>(timer.id.period, 1);
     if (timer.runs < 10) return stated;
@@ -427,8 +185,17 @@ class Importing {
   // ---- what the recording does not say ----
 
   /// Returns the first group of its node in which no callback ran at the same time as one of the unit, and adds it.
-  std::string group_of(std::size_t unit, std::vector<Positions> &groups) const {
-    const std::string &node = first_of(units_[unit]).id.node;
+  std::string group_of(std::size_t unit, std::vector<Positions> &groups) {
+    const CallbackRecord &first = first_of(units_[unit]);
+    const std::string &node = first.id.node;
+    if (first.group != 0) {
+      // Its number among the groups of the process, in the order of their first callbacks.
+      const auto at = std::find(known_groups_.begin(), known_groups_.end(), first.group);
+      const auto number = at - known_groups_.begin() + 1;
+      if (at == known_groups_.end()) known_groups_.push_back(first.group);
+      return recording_.is_exclusive(first.process, first.group) ? fmt::format("group {}", number) : std::string();
+    }
+    are_groups_assumed_ = true;
     const auto overlaps = [&](std::size_t other) {
       for (const std::size_t member : units_[unit].members) {
         for (const std::size_t beside : units_[other].members) {
@@ -457,7 +224,7 @@ class Importing {
         some = some || !task.group.empty();
       }
     }
-    if (some) {
+    if (some && are_groups_assumed_) {
       result_.remarks.emplace_back(
           "unknown: callback groups. Assumed: callbacks of a node that never ran at the same time share a mutually "
           "exclusive one ('group').");
@@ -473,12 +240,6 @@ class Importing {
     }
     result_.executed = process_.executed;
     result_.length = recording_.last() - recording_.first();
-    std::uint64_t seen = 0;
-    for (const metrics::CountedDurations &range : process_.delays.counted()) {
-      seen += range.count;
-      result_.overhead = range.low;
-      if (seen * 10 >= process_.delays.size()) break;  // a tenth of the runs found an idle thread
-    }
     const auto remark = [&](std::string text) { result_.remarks.push_back(std::move(text)); };
     remark(fmt::format("{} in {}, on {} of {}, which 'workers' counts.", plural(process_.runs, "run"),
                        humanize_duration(recording_.last() - recording_.first()), process_.threads.size(),
@@ -493,10 +254,12 @@ class Importing {
         plural(result_.messages, "message"), share_of(result_.over_edges, result_.messages),
         share_of(result_.as_sources, result_.messages)));
     if (result_.overhead > 0) {
-      remark(
-          fmt::format("A tenth of the runs began within {} of their release: what the executor takes "
-                      "(--overhead-dispatch).",
-                      humanize_duration(result_.overhead)));
+      remark(fmt::format("The executor takes {} from one callback to the next (--overhead-dispatch).",
+                         humanize_duration(result_.overhead)));
+    }
+    if (result_.wake_ups.count > 0) {
+      remark(fmt::format("An idle thread wakes up within {} (median; 99 % within {}).",
+                         humanize_duration(result_.wake_ups.p50), humanize_duration(result_.wake_ups.p99)));
     }
     if (process_.unknown_runs > 0) {
       remark(fmt::format("unknown: {} of callbacks whose creation was not recorded.",
@@ -510,11 +273,10 @@ class Importing {
 
   const std::vector<CallbackRecord> &callbacks_;
   const Recording &recording_;
-  std::uint32_t pid_;
   const ProcessRecord &process_;
-  std::map<std::string, Positions> publishers_;  // of topics: callbacks
   std::vector<Unit> units_;
-  std::map<std::size_t, std::size_t> unit_of_;
+  std::vector<std::uint64_t> known_groups_;
+  bool are_groups_assumed_ = false;
   ImportedWorkload result_;
 };
 
@@ -552,6 +314,28 @@ std::string to_yaml(const ImportedWorkload &imported) {
     }
     text += line;
     at = end;
+  }
+  return text;
+}
+
+std::string to_robot_yaml(std::vector<ImportedWorkload> processes, std::uint32_t cpus) {
+  std::string text = fmt::format(
+      "# Every process as it would be with an executor of ReDAG-RT. unknown: the processors; the recording has events "
+      "of these.\nrobot: recorded\ncpus: 0-{}\nprocesses:\n",
+      cpus - 1);
+  std::set<std::string> names;
+  for (ImportedWorkload &process : processes) {
+    process.workload.platform.preemption = PreemptionMode::Os;
+    process.workload.platform.workers = cpus;
+    process.workload.name = unique_name(process.workload.name, names);
+    const std::string plain = "\n" + to_yaml(process);
+    const std::size_t name = plain.find("\nname: ") + 1;
+    text += "  - " + plain.substr(name, plain.find('\n', name) + 1 - name) + "    workload:\n";
+    for (std::size_t at = 1; at < plain.size();) {
+      const std::size_t end = plain.find('\n', at) + 1;
+      text += "      " + plain.substr(at, end - at);
+      at = end;
+    }
   }
   return text;
 }

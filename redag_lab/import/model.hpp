@@ -14,6 +14,14 @@
 
 namespace redag::lab {
 
+/// What a simulation of the recorded run repeats of a task.
+struct Replay {
+  Duration phase = 0;
+  std::vector<Duration> demands;    // of its jobs in order: executions, and what delayed them but other callbacks
+  std::vector<Duration> gaps;       // of events in order: from the shortest distance to the one seen
+  metrics::Distribution responses;  // without values where no event says when a job was released
+};
+
 /// A workload, and what its file says in comments.
 struct ImportedWorkload {
   Workload workload;
@@ -26,11 +34,11 @@ struct ImportedWorkload {
   std::uint64_t messages = 0;    // that callbacks took
   std::uint64_t over_edges = 0;  // of these, with an edge from the task that sent them
   std::uint64_t as_sources = 0;  // of these, to tasks with a rate of their own
-  // What the simulation of the recorded run needs, by TaskId.
-  std::vector<Duration> phases;
-  std::vector<metrics::Distribution> responses;  // without values where no event says when a job was released
-  Duration length = 0;                           // of the recording
-  Duration overhead = 0;                         // from release to begin where nothing is in the way
+  // What the simulation of the recorded run needs.
+  std::vector<Replay> replays;     // by TaskId
+  Duration length = 0;             // of the recording
+  Duration overhead = 0;           // of the executor for each job
+  metrics::Distribution wake_ups;  // from release to begin where all threads were idle
 };
 
 /// How the messages or requests of a source come.
@@ -50,5 +58,9 @@ struct Arrivals {
 
 /// Writes the workload with its notes as comments. Every one of something that is not known has the word "unknown".
 [[nodiscard]] std::string to_yaml(const ImportedWorkload &imported);
+
+/// Writes a robot file (docs/robot.md) of several processes, as they would be under ReDAG-RT in `os` mode on `cpus`
+/// processors. Requires at least one of each.
+[[nodiscard]] std::string to_robot_yaml(std::vector<ImportedWorkload> processes, std::uint32_t cpus);
 
 }  // namespace redag::lab

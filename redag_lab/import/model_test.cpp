@@ -6,15 +6,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <map>
-#include <set>
+#include <cstdint>
+#include <string>
+#include <vector>
 
-#include "redag/loader/workload_yaml.hpp"
-#include "redag_lab/import/self_check.hpp"
-#include "redag_lab/run/session.hpp"
-#include "redag_lab/run/variant.hpp"
-#include "redag_lab/workload/generate.hpp"
+#include "redag_lab/import/recorded_nodes_test.hpp"
 
 namespace redag::lab {
 namespace {
@@ -22,155 +18,32 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-
-constexpr Time kMs = kMillisecond;
-
-// Writes the events of one process as rclcpp records them. Handles are numbers that it gives out.
-class RecordedNodes {
- public:
-  using Kind = RosEvent::Kind;
-  using Handle = std::uint64_t;
-
-  explicit RecordedNodes(Recording &recording, std::uint32_t process = 1) : recording_(recording), process_(process) {}
-
-  Time now = 0;
-
-  Handle node(const std::string &name) {
-    const Handle handle = next_++;
-    add(Kind::NodeInit, handle, 0, 0, name, "/");
-    return handle;
-  }
-  Handle publisher(Handle node, const std::string &topic) {
-    const Handle handle = next_++;
-    add(Kind::PublisherInit, handle, node, 0, topic);
-    return handle;
-  }
-  /// Returns the callback, as the functions below do.
-  Handle subscription(Handle node, const std::string &topic) {
-    const Handle handle = next_;
-    next_ += 4;
-    RosEvent event = made(Kind::SubscriptionInit, handle, node, 0, topic);
-    event.third = handle + 1;
-    recording_.add(event);
-    add(Kind::SubscriptionObject, handle, handle + 2);
-    add(Kind::SubscriptionCallback, handle + 2, handle + 3);
-    taking_[handle + 3] = handle + 1;
-    return handle + 3;
-  }
-  Handle service(Handle node, const std::string &name) {
-    const Handle handle = next_;
-    next_ += 2;
-    add(Kind::ServiceInit, handle, node, 0, name);
-    add(Kind::CallbackAdded, handle, handle + 1);
-    return handle + 1;
-  }
-  Handle timer(Handle node, Duration period) {
-    const Handle handle = next_;
-    next_ += 2;
-    add(Kind::TimerInit, handle, 0, period);
-    add(Kind::CallbackAdded, handle, handle + 1);
-    add(Kind::TimerNode, handle, node);
-    return handle + 1;
-  }
-
-  void start(std::uint32_t thread, Handle callback, bool intra_process = false) {
-    thread_ = thread;
-    add(Kind::Start, callback, 0, intra_process ? 1 : 0);
-  }
-  void take(std::uint32_t thread, Handle callback, Time sent) {
-    thread_ = thread;
-    add(Kind::Take, taking_.at(callback), 0, sent);
-  }
-  void publish(std::uint32_t thread, Handle publisher) {
-    thread_ = thread;
-    add(Kind::Publish, publisher);
-  }
-  void end(std::uint32_t thread, Handle callback) {
-    thread_ = thread;
-    add(Kind::End, callback);
-  }
-  /// A whole run of a callback at this time.
-  void run(std::uint32_t thread, Handle callback, Time at, Duration length, Handle publisher = 0) {
-    now = at;
-    start(thread, callback);
-    now = at + length;
-    if (publisher != 0) publish(thread, publisher);
-    end(thread, callback);
-  }
-  void switch_to(std::uint64_t leaving, std::uint64_t coming) { add(Kind::Switch, leaving, coming); }
-  void add(Kind kind, Handle handle, Handle other = 0, std::int64_t value = 0, std::string_view name = {},
-           std::string_view space = {}) {
-    recording_.add(made(kind, handle, other, value, name, space));
-  }
-
- private:
-  [[nodiscard]] RosEvent made(Kind kind, Handle handle, Handle other, std::int64_t value, std::string_view name,
-                              std::string_view space = {}) const {
-    RosEvent event;
-    event.kind = kind;
-    event.time = now;
-    event.process = process_;
-    event.thread = thread_;
-    event.handle = handle;
-    event.other = other;
-    event.value = value;
-    event.name = name;
-    event.space = space;
-    event.program = "robot";
-    return event;
-  }
-
-  Recording &recording_;
-  std::uint32_t process_;
-  std::uint32_t thread_ = 1;
-  Handle next_ = 1000;
-  std::map<Handle, Handle> taking_;
-};
-
-ImportedWorkload import(const Recording &recording, std::uint32_t process = 1) {
-  Result<ImportedWorkload> imported = import_workload(recording, process);
-  if (!imported) {
-    ADD_FAILURE() << to_string(imported.error());
-    return {};
-  }
-  // The file is read as it was meant.
-  const Result<LoadedWorkload> loaded = parse_workload(to_yaml(*imported), "robot.yaml");
-  if (loaded) {
-    EXPECT_EQ(loaded->workload, imported->workload) << to_yaml(*imported);
-  } else {
-    ADD_FAILURE() << to_yaml(*imported) << to_string(loaded.error());
-  }
-  return *std::move(imported);
-}
-
-const Task &task_named(const ImportedWorkload &imported, const std::string &part) {
-  static const Task kNone;
-  for (const TaskRef &ref : flatten(imported.workload)) {
-    if (ref.task->name.find(part) != std::string::npos) return *ref.task;
-  }
-  ADD_FAILURE() << "no task " << part << " in\n" << to_yaml(imported);
-  return kNone;
-}
-
-std::string notes_of(const ImportedWorkload &imported, const std::string &part) {
-  std::string text;
-  for (const TaskRef &ref : flatten(imported.workload)) {
-    if (ref.task->name.find(part) == std::string::npos) continue;
-    for (const std::string &note : imported.notes[ref.id.value]) text += note + "\n";
-  }
-  return text;
-}
-
-std::string all_remarks(const ImportedWorkload &imported) {
-  std::string text;
-  for (const std::string &remark : imported.remarks) text += remark + "\n";
-  return text;
-}
+using ::testing::Not;
 
 class Import : public ::testing::Test {
  public:
   Recording recording;
   RecordedNodes nodes{recording};
+
+  // Two timers send to a node whose later callback of a round works for 6 ms, by `longer` more each time.
+  void fuse_two_inputs(RecordedNodes::Handle publisher, Duration longer) {
+    const auto left = nodes.node("left");
+    const auto right = nodes.node("right");
+    const auto fuse = nodes.node("fuse");
+    const auto a = nodes.timer(left, 20 * kMs);
+    const auto b = nodes.timer(right, 20 * kMs);
+    const auto to_a = nodes.publisher(left, "/a");
+    const auto to_b = nodes.publisher(right, "/b");
+    const auto from_a = nodes.subscription(fuse, "/a");
+    const auto from_b = nodes.subscription(fuse, "/b");
+    for (Time k = 1; k <= 40; ++k) {
+      nodes.run(1, a, k * 20 * kMs, kMs, to_a);
+      nodes.run(1, b, k * 20 * kMs + kMs, kMs, to_b);
+      const bool a_first = k % 3 == 0;
+      nodes.run(2, a_first ? from_a : from_b, k * 20 * kMs + 3 * kMs, 1000);
+      nodes.run(2, a_first ? from_b : from_a, k * 20 * kMs + 4 * kMs, 6 * kMs + k * longer, publisher);
+    }
+  }
 };
 
 TEST_F(Import, FindsTimersAndWhatFollowsThem) {
@@ -203,8 +76,8 @@ TEST_F(Import, FindsTimersAndWhatFollowsThem) {
   EXPECT_EQ(dag.tasks[1].wcet, 5 * kMs);
   EXPECT_EQ(imported.executed, imported.explained);
   EXPECT_EQ(imported.over_edges, 20U);
-  EXPECT_EQ(imported.responses[0].max, 2 * kMs + 20);
-  EXPECT_EQ(imported.responses[1].max, 6 * kMs - 1);  // from the message, at the end of the scan
+  EXPECT_EQ(imported.replays[0].responses.max, 2 * kMs + 20);
+  EXPECT_EQ(imported.replays[1].responses.max, 6 * kMs - 1);  // from the message, at the end of the scan
   EXPECT_EQ(imported.overhead, 0);
   EXPECT_THAT(all_remarks(imported), HasSubstr("wall time"));
   EXPECT_THAT(notes_of(imported, "/lidar"), HasSubstr("longest of 20 runs"));
@@ -214,8 +87,8 @@ TEST_F(Import, KnowsWhenTimersExpired) {
   const auto timer = nodes.timer(nodes.node("early"), 10 * kMs);
   for (Time k = 1; k <= 100; ++k) nodes.run(1, timer, k * 10 * kMs + (k % 2 == 0 ? -2000 : 60'000), kMs);
   const ImportedWorkload imported = import(recording);
-  EXPECT_EQ(imported.responses[0].min, kMs);
-  EXPECT_EQ(imported.responses[0].max, kMs + 60'000);
+  EXPECT_EQ(imported.replays[0].responses.min, kMs);
+  EXPECT_EQ(imported.replays[0].responses.max, kMs + 60'000);
 }
 
 TEST_F(Import, SplitsWhereRatesDiffer) {
@@ -237,23 +110,7 @@ TEST_F(Import, SplitsWhereRatesDiffer) {
 
 // The last callback of a round does the work and publishes: the round is one job.
 TEST_F(Import, JoinsCallbacksThatWaitForEachOther) {
-  const auto left = nodes.node("left");
-  const auto right = nodes.node("right");
-  const auto fuse = nodes.node("fuse");
-  const auto a = nodes.timer(left, 20 * kMs);
-  const auto b = nodes.timer(right, 20 * kMs);
-  const auto to_a = nodes.publisher(left, "/a");
-  const auto to_b = nodes.publisher(right, "/b");
-  const auto to_c = nodes.publisher(fuse, "/c");
-  const auto from_a = nodes.subscription(fuse, "/a");
-  const auto from_b = nodes.subscription(fuse, "/b");
-  for (Time k = 1; k <= 40; ++k) {
-    nodes.run(1, a, k * 20 * kMs, kMs, to_a);
-    nodes.run(1, b, k * 20 * kMs + kMs, kMs, to_b);
-    const bool a_first = k % 3 == 0;
-    nodes.run(2, a_first ? from_a : from_b, k * 20 * kMs + 3 * kMs, 1000);
-    nodes.run(2, a_first ? from_b : from_a, k * 20 * kMs + 4 * kMs, 6 * kMs, to_c);
-  }
+  fuse_two_inputs(nodes.publisher(nodes.node("sender"), "/c"), 0);
   const ImportedWorkload imported = import(recording);
   ASSERT_EQ(imported.workload.task_count(), 3U) << to_yaml(imported);
   const Task &joined = task_named(imported, "/fuse");
@@ -264,21 +121,7 @@ TEST_F(Import, JoinsCallbacksThatWaitForEachOther) {
 }
 
 TEST_F(Import, JoinsCallbacksThatPublishNothing) {
-  const auto left = nodes.node("left");
-  const auto fuse = nodes.node("fuse");
-  const auto a = nodes.timer(left, 20 * kMs);
-  const auto b = nodes.timer(left, 20 * kMs);
-  const auto to_a = nodes.publisher(left, "/a");
-  const auto to_b = nodes.publisher(left, "/b");
-  const auto from_a = nodes.subscription(fuse, "/a");
-  const auto from_b = nodes.subscription(fuse, "/b");
-  for (Time k = 1; k <= 40; ++k) {
-    nodes.run(1, a, k * 20 * kMs, kMs, to_a);
-    nodes.run(1, b, k * 20 * kMs + kMs, kMs, to_b);
-    const bool a_first = k % 3 == 0;
-    nodes.run(2, a_first ? from_a : from_b, k * 20 * kMs + 3 * kMs, 1000);
-    nodes.run(2, a_first ? from_b : from_a, k * 20 * kMs + 4 * kMs, 6 * kMs + k);
-  }
+  fuse_two_inputs(0, 1);
   const ImportedWorkload imported = import(recording);
   ASSERT_EQ(imported.workload.task_count(), 3U) << to_yaml(imported);
   EXPECT_EQ(task_named(imported, "/fuse").predecessors.size(), 2U);
@@ -532,242 +375,73 @@ TEST_F(Import, RefusesNamesThatNoFileCanHold) {
   EXPECT_FALSE(import_workload(recording, 1));
 }
 
-TEST(Arrivals, OfALossyBus) {
-  std::vector<Time> instants;
-  for (Time k = 0; k < 200; ++k) {
-    if (k % 10 != 3) instants.push_back(k * 5 * kMs + (k % 3) * 20'000);
+TEST_F(Import, TellsWakeUpsFromWaiting) {
+  const auto node = nodes.node("busy");
+  const auto first = nodes.timer(node, 10 * kMs);
+  const auto second = nodes.timer(node, 10 * kMs);
+  for (Time k = 1; k <= 100; ++k) {
+    nodes.run(1, first, k * 10 * kMs + 80'000, kMs);                // the thread slept
+    nodes.run(1, second, k * 10 * kMs + 80'000 + kMs + 7000, kMs);  // the thread was busy
   }
-  const Arrivals arrivals = estimate_arrivals(instants);
-  EXPECT_EQ(arrivals.period, 5 * kMs);
-  EXPECT_FALSE(arrivals.sporadic);
-  EXPECT_NEAR(static_cast<double>(arrivals.jitter), 40'000, 1000);
-  EXPECT_THAT(arrivals.note, HasSubstr("20 of 200 did not come"));
+  const ImportedWorkload imported = import(recording);
+  EXPECT_EQ(imported.wake_ups.count, 100U);
+  EXPECT_EQ(imported.wake_ups.p50, 80'000);
+  EXPECT_EQ(imported.overhead, 7000);
+  EXPECT_EQ(imported.replays[0].demands, std::vector<Duration>(100, kMs + 80'000));
+  EXPECT_EQ(imported.replays[1].demands, std::vector<Duration>(100, kMs + 7000));
 }
 
-TEST(Arrivals, OfBursts) {
-  std::vector<Time> instants;
-  for (Time k = 0; k < 100; ++k) {
-    for (const Time at : {0, 10'000, 70'000}) instants.push_back(k * 100 * kMs + at);
+// A response counts from the message that was taken, though a later one was sent before the callback began.
+TEST_F(Import, KnowsWhichMessageWasTaken) {
+  const auto sender = nodes.node("sender");
+  const auto timer = nodes.timer(sender, 10 * kMs);
+  const auto publisher = nodes.publisher(sender, "/x");
+  const auto taker = nodes.subscription(nodes.node("taker"), "/x");
+  for (Time k = 1; k <= 20; ++k) {
+    nodes.run(1, timer, k * 10 * kMs, kMs, publisher);
+    if (k == 1) continue;
+    nodes.now = k * 10 * kMs + 2 * kMs;
+    nodes.take(2, taker, (k - 1) * 10 * kMs + kMs + 20'000);  // the middleware stamps it a little later
+    nodes.run(2, taker, nodes.now, 3 * kMs);
   }
-  const Arrivals arrivals = estimate_arrivals(instants);
-  EXPECT_NEAR(static_cast<double>(arrivals.period), 100.0 / 3 * kMs, kMs);
-  EXPECT_EQ(arrivals.jitter, arrivals.period);
-  EXPECT_THAT(arrivals.note, HasSubstr("unknown"));
+  EXPECT_EQ(import(recording).replays[1].responses.p50, 14 * kMs);
 }
 
-TEST(Arrivals, AtOneInstant) { EXPECT_EQ(estimate_arrivals({5, 5, 5}).period, 1); }
-
-// ---- random workloads, simulated, and recorded as ros2_tracing would ----
-
-// Nodes that run a workload: one for each task, with a timer, or a subscription for each predecessor. The message that
-// completes the predecessors of a data task runs its job; earlier ones are stored. Every third timer task takes
-// messages from outside instead.
-class SimulatedNodes {
- public:
-  SimulatedNodes(const Workload &workload, Recording &recording, bool some_outside = true) : nodes_(recording) {
-    for (const TaskRef &ref : flatten(workload)) {
-      Node &node = tasks_.emplace_back();
-      node.name = name_of(ref.id);
-      const auto handle = nodes_.node(node.name);
-      const std::size_t first = ref.id.value - ref.index;
-      for (const std::uint32_t p : ref.task->predecessors) {
-        node.inputs.emplace_back(first + p, nodes_.subscription(handle, "/" + name_of(TaskId(first + p)) + "/out"));
-      }
-      node.is_outside = some_outside && node.inputs.empty() && ref.id.value % 3 == 2;
-      if (node.is_outside) {
-        node.source = nodes_.subscription(handle, "/outside/" + node.name);
-      } else if (node.inputs.empty()) {
-        nodes_.now = ref.task->offset;  // where the timer's grid begins
-        node.source = nodes_.timer(handle, ref.task->period);
-        nodes_.now = 0;
-      }
-      node.output = nodes_.publisher(handle, "/" + node.name + "/out");
-    }
-    for (std::size_t task = 0; task < tasks_.size(); ++task) {
-      for (const auto &[from, callback] : tasks_[task].inputs) tasks_[from].successors.push_back(task);
-    }
+TEST_F(Import, TrustsTheClockOfANearSender) {
+  const auto near = nodes.subscription(nodes.node("near"), "/near");
+  const auto far = nodes.subscription(nodes.node("far"), "/far");
+  for (Time k = 1; k <= 20; ++k) {
+    nodes.now = k * 10 * kMs;
+    nodes.take(1, near, nodes.now - kMs);
+    nodes.run(1, near, nodes.now, kMs);
+    nodes.now += 2 * kMs;
+    nodes.take(1, far, nodes.now + kMs);  // sent later than taken
+    nodes.run(1, far, nodes.now, kMs);
   }
-
-  static std::string name_of(TaskId task) { return "n" + std::to_string(task.value); }
-
-  /// Longest execution of each task in the recording.
-  std::vector<Duration> longest;
-
-  // Returns false if something happened that these nodes do not do.
-  bool play(const std::vector<JobEvent> &events) {
-    longest.assign(tasks_.size(), 0);
-    for (const JobEvent &event : events) {
-      nodes_.now = event.time;
-      Node &node = tasks_[event.task.value];
-      switch (event.kind) {
-        case JobEventKind::Released: node.released = event.value; break;
-        case JobEventKind::Dispatched:
-          if (node.is_outside) nodes_.take(event.worker, node.source, kEpoch + node.released);
-          node.running = node.inputs.empty() ? node.source : node.trigger;
-          node.started = event.time;
-          nodes_.start(event.worker, node.running);
-          break;
-        case JobEventKind::Finished:
-          if (!node.successors.empty()) nodes_.publish(event.worker, node.output);
-          nodes_.end(event.worker, node.running);
-          longest[event.task.value] = std::max(longest[event.task.value], event.time - node.started);
-          node.running = 0;
-          for (const std::size_t to : node.successors) deliver(event.task.value, tasks_[to], event.worker);
-          break;
-        case JobEventKind::Ready:
-        case JobEventKind::Started:
-        case JobEventKind::Executed: break;
-        default: return false;
-      }
-      if (overlapped_) return false;
-    }
-    return true;
-  }
-
- private:
-  static constexpr Time kEpoch = 1'700'000'000 * kSecond;  // messages have another clock than events
-
-  struct Node {
-    std::string name;
-    std::vector<std::pair<std::size_t, RecordedNodes::Handle>> inputs;
-    std::vector<std::size_t> successors;
-    std::set<std::size_t> fresh;
-    RecordedNodes::Handle source = 0;
-    RecordedNodes::Handle output = 0;
-    RecordedNodes::Handle trigger = 0;
-    RecordedNodes::Handle running = 0;
-    Time released = 0;
-    Time started = 0;
-    bool is_outside = false;
-  };
-
-  void deliver(std::size_t from, Node &to, std::uint32_t thread) {
-    if (to.running != 0) overlapped_ = true;  // would wait for the node's group
-    to.fresh.insert(from);
-    const auto input = std::find_if(to.inputs.begin(), to.inputs.end(), [&](const auto &i) { return i.first == from; });
-    if (to.fresh.size() == to.inputs.size()) {
-      to.trigger = input->second;
-      to.fresh.clear();
-    } else {
-      nodes_.start(thread, input->second);
-      nodes_.end(thread, input->second);
-    }
-  }
-
-  RecordedNodes nodes_;
-  std::vector<Node> tasks_;
-  bool overlapped_ = false;
-};
-
-GenerateOptions random_robots() {
-  GenerateOptions options;
-  options.dags = 3;
-  options.utilization = 0.7;
-  options.period_min = 10 * kMillisecond;
-  options.period_max = 200 * kMillisecond;
-  options.bcet_min = 0.5;
-  return options;
+  const ImportedWorkload imported = import(recording);
+  EXPECT_EQ(imported.replays[0].responses.p50, 2 * kMs);
+  EXPECT_EQ(imported.replays[1].responses.count, 0U);
 }
 
-trace::Trace simulated(const Workload &workload, std::uint64_t seed, Duration duration = 20 * kSecond) {
-  SessionOptions session;
-  session.duration = duration;
-  session.seed = seed;
-  Result<Session> run = run_session(workload, *parse_variant("mte"), session);
-  if (run) return std::move(run->trace);
-  ADD_FAILURE() << to_string(run.error());
-  return {};
-}
-
-TEST(SimulatedRecording, IsImportedAsTheWorkload) {
-  std::size_t used = 0;
-  std::size_t edges = 0;
-  std::size_t found_edges = 0;
-  for (std::uint64_t seed = 1; seed <= 60; ++seed) {
-    SCOPED_TRACE(seed);
-    const Result<Workload> generated = generate(random_robots(), seed);
-    ASSERT_TRUE(generated);
-    Recording recording;
-    SimulatedNodes nodes(*generated, recording);
-    if (!nodes.play(simulated(*generated, seed).events)) continue;
-    ++used;
-    const Result<ImportedWorkload> imported = import_workload(recording, 1);
-    ASSERT_TRUE(imported) << to_string(imported.error());
-
-    std::map<std::string, std::vector<TaskRef>> by_node;
-    for (const TaskRef &ref : flatten(imported->workload)) by_node[ref.task->callback->node].push_back(ref);
-    const auto node_of = [&](const TaskRef &ref, std::uint32_t p) {
-      return imported->workload.dags[ref.dag.value].tasks[p].callback->node;
-    };
-    for (const TaskRef &original : flatten(*generated)) {
-      const std::vector<TaskRef> &tasks = by_node["/" + SimulatedNodes::name_of(original.id)];
-      // The task is the longest: others only store messages.
-      const auto main = std::max_element(
-          tasks.begin(), tasks.end(), [](const TaskRef &a, const TaskRef &b) { return a.task->wcet < b.task->wcet; });
-      ASSERT_NE(main, tasks.end()) << to_yaml(*imported);
-      EXPECT_EQ(main->task->period, original.task->period) << to_yaml(*imported);
-      EXPECT_EQ(main->task->wcet, nodes.longest[original.id.value]) << to_yaml(*imported);
-      EXPECT_EQ(main->task->activation, original.task->activation);
-      std::set<std::string> expected;
-      for (const std::uint32_t p : original.task->predecessors) {
-        expected.insert("/" + SimulatedNodes::name_of(TaskId(original.id.value - original.index + p)));
-      }
-      // If the message of one predecessor is always the last, nothing tells that the task waits for the others, too:
-      // they have tasks of their own, which store.
-      std::set<std::string> waits_for;
-      std::set<std::string> all;
-      for (const TaskRef &ref : tasks) {
-        for (const std::uint32_t p : ref.task->predecessors) {
-          all.insert(node_of(ref, p));
-          if (ref.id == main->id) waits_for.insert(node_of(ref, p));
-        }
-      }
-      EXPECT_EQ(all, expected) << to_yaml(*imported);
-      EXPECT_EQ(waits_for.empty(), expected.empty()) << to_yaml(*imported);
-      edges += expected.size();
-      found_edges += waits_for.size();
-    }
-    EXPECT_EQ(imported->explained, imported->executed);
-    EXPECT_LE(imported->workload.platform.workers, generated->platform.workers);
+TEST_F(Import, KnowsTheGroupsThatCaretRecords) {
+  const auto node = nodes.node("grouped");
+  std::vector<RecordedNodes::Handle> timers;
+  for (std::uint64_t i = 0; i < 4; ++i) {
+    timers.push_back(nodes.timer(node, 10 * kMs));
+    const RecordedNodes::Handle group = i < 2 ? 1 : i;
+    nodes.add(RosEvent::Kind::GroupMember, timers.back() - 1, group);
+    nodes.add(RosEvent::Kind::Group, group, 0, 0, i == 3 ? "reentrant" : "mutually_exclusive");
   }
-  EXPECT_GE(used, 50U);
-  EXPECT_GT(static_cast<double>(found_edges), 0.7 * static_cast<double>(edges));
-  RecordProperty("workloads", static_cast<int>(used));
-  RecordProperty("edges", static_cast<int>(edges));
-  RecordProperty("found", static_cast<int>(found_edges));
-}
-
-TEST(SimulatedRecording, IsReproducedByTheModelOfItsExecutor) {
-  GenerateOptions options = random_robots();
-  options.shape = DagShape::Chain;
-  options.offsets = true;
-  std::size_t tasks = 0;
-  std::size_t reproduced = 0;
-  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-    SCOPED_TRACE(seed);
-    const Result<Workload> generated = generate(options, seed);
-    ASSERT_TRUE(generated);
-    Recording recording;
-    SimulatedNodes nodes(*generated, recording, false);
-    ASSERT_TRUE(nodes.play(simulated(*generated, seed, 100 * kSecond).events));
-    Result<ImportedWorkload> imported = import_workload(recording, 1);
-    ASSERT_TRUE(imported) << to_string(imported.error());
-    const Result<SelfCheck> check = check_against_recording(*imported);
-    ASSERT_TRUE(check) << to_string(check.error());
-    EXPECT_EQ(check->executor, "mte");
-    EXPECT_EQ(check->tasks.size(), generated->task_count());
-    for (const ReproducedTask &task : check->tasks) {
-      EXPECT_LE(task.p50_error, 0.1) << task.name;
-      ++tasks;
-      if (task.is_reproduced()) ++reproduced;
+  for (Time k = 1; k <= 20; ++k) {
+    for (std::size_t i = 0; i < timers.size(); ++i) {
+      nodes.run(1, timers[i], k * 10 * kMs + static_cast<Time>(i) * kMs, kMs);
     }
-    // On one worker it is another robot.
-    imported->workload.platform.workers = 1;
-    const Result<SelfCheck> other = check_against_recording(*imported);
-    ASSERT_TRUE(other) << to_string(other.error());
-    EXPECT_FALSE(
-        std::all_of(other->tasks.begin(), other->tasks.end(), [](const auto &t) { return t.is_reproduced(); }));
   }
+  const ImportedWorkload imported = import(recording);
+  std::vector<std::string> groups;
+  for (const TaskRef &ref : flatten(imported.workload)) groups.push_back(ref.task->group);
+  EXPECT_THAT(groups, ElementsAre("group 1", "group 1", "", ""));
+  EXPECT_THAT(all_remarks(imported), Not(HasSubstr("callback groups")));
 }
 
 }  // namespace

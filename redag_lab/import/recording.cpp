@@ -4,6 +4,7 @@
 #include "redag_lab/import/recording.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 
 namespace redag::lab {
 
@@ -21,7 +22,7 @@ void Recording::add(const RosEvent &event) {
   const Key key{event.process, event.handle};
   switch (event.kind) {
     case Kind::NodeInit:
-      nodes_[key] = Node{std::string(event.space) + (event.space == "/" ? "" : "/") + std::string(event.name), 0};
+      nodes_[key] = Node{std::string(event.space) + (event.space == "/" ? "" : "/") + std::string(event.name)};
       break;
     case Kind::PublisherInit: publishers_[key] = event.name; break;
     case Kind::SubscriptionInit:
@@ -38,6 +39,7 @@ void Recording::add(const RosEvent &event) {
       const auto node = nodes_.find({event.process, event.other});
       if (timer == kUnknown || node == nodes_.end()) break;
       callbacks_[timer].id.node = node->second.name;
+      callbacks_[timer].node = event.other;
       callbacks_[timer].id.index = node->second.timers++;
       break;
     }
@@ -45,12 +47,21 @@ void Recording::add(const RosEvent &event) {
     case Kind::End: end(event); break;
     case Kind::Publish:
     case Kind::IntraPublish: publish(event); break;
-    case Kind::Take: {
+    case Kind::Take:
+    case Kind::Dispatch: {
       Thread &thread = thread_of(event);
       thread.taken_by = event.value > 0 ? find(event.process, event.handle) : kUnknown;
       thread.sent = event.value;
       break;
     }
+    case Kind::Group:
+      if (event.name == "reentrant") reentrant_.insert(key);
+      break;
+    case Kind::GroupMember:
+      if (const std::size_t member = find(event.process, event.handle); member != kUnknown) {
+        callbacks_[member].group = event.other;
+      }
+      break;
     case Kind::Executor: process.executor_threads.insert(event.thread); break;
     case Kind::Switch: break;
   }
@@ -62,10 +73,12 @@ void Recording::make(const RosEvent &event, Callback::Kind kind) {
   made.process = event.process;
   made.id.kind = kind;
   made.id.name = event.name;
-  made.created = event.time;
+  made.created = event.created != 0 ? event.created : event.time;
   if (kind == Callback::Kind::Timer) made.id.period = event.value;
   const auto node = nodes_.find({event.process, event.other});
-  if (node != nodes_.end()) made.id.node = node->second.name;
+  if (node == nodes_.end()) return;
+  made.id.node = node->second.name;
+  made.node = event.other;
 }
 
 std::size_t Recording::find(std::uint32_t process, std::uint64_t address) const {
@@ -114,22 +127,58 @@ void Recording::start(const RosEvent &event) {
     }
     note_overlaps(thread, position);
   }
+  const auto released = position == kUnknown ? std::nullopt : release_of(position, thread, event.time);
   thread.taken_by = kUnknown;
-  const auto released = position == kUnknown ? std::nullopt : release_of(callbacks_[position], event.time);
-  if (released) thread.process->delays.add(event.time - *released);
-  thread.runs.push_back({event.handle, position, event.time, released, thread.absent, 0, {}});
+  Node *node = position == kUnknown ? nullptr : node_of(position);
+  std::optional<Duration> delay;
+  if (released) delay = note_delay(*released, event.time, thread, node);
+  if (node != nullptr) ++node->running;
+  thread.runs.push_back({event.handle, position, node, event.time, released, delay, thread.absent, 0, {}});
 }
 
-std::optional<Time> Recording::release_of(const CallbackRecord &callback, Time start) const {
+/// Returns by how much the executor and the machine delayed a run: other callbacks of its thread and node did not.
+std::optional<Duration> Recording::note_delay(Time released, Time start, Thread &thread, const Node *node) {
+  if (!thread.runs.empty()) return std::nullopt;  // another callback called it
+  if (node == nullptr || node->running > 0) return std::nullopt;
+  const Time free = std::max({released, thread.last_end, node->last_end});
+  ProcessRecord &process = *thread.process;
+  (free == released ? process.wake_ups : process.turnarounds).add(start - free);
+  return start - free;
+}
+
+Recording::Node *Recording::node_of(std::size_t callback) {
+  const auto node = nodes_.find({callbacks_[callback].process, callbacks_[callback].node});
+  return node == nodes_.end() ? nullptr : &node->second;
+}
+
+void Recording::leave(const Run &run, Time now) {
+  if (run.node == nullptr) return;
+  run.node->running -= run.node->running > 0 ? 1 : 0;  // 0 if another node came to its address
+  run.node->last_end = now;
+}
+
+std::optional<Time> Recording::release_of(std::size_t position, const Thread &thread, Time start) const {
+  const CallbackRecord &callback = callbacks_[position];
   const Duration period = callback.id.period;
   if (period > 0) {
     // The timer's grid begins a little before its creation is recorded.
     const Duration early = std::min(period / 10, kMillisecond);
     return std::min(start, start + early - (start + early - callback.created) % period);
   }
-  const auto sent = last_sent_.find(callback.id.name);
-  if (callback.id.kind != Callback::Kind::Subscription || sent == last_sent_.end()) return std::nullopt;
-  return sent->second;
+  if (callback.id.kind != Callback::Kind::Subscription) return std::nullopt;
+  const auto messages = sent_.find(callback.id.name);
+  const bool is_stamped = thread.taken_by == position;
+  if (messages == sent_.end()) {
+    // Of a process that was not recorded: its clock is trusted if it can be this one.
+    const bool is_near = is_stamped && thread.sent <= start && start - thread.sent <= kSecond;
+    return is_near ? std::optional(thread.sent) : std::nullopt;
+  }
+  if (!is_stamped) return messages->second.back();
+  // The middleware's clock can be another one, and it reads it a little after the event.
+  const auto distance = [&](Time time) { return std::abs(time - thread.sent); };
+  const Time nearest = *std::min_element(messages->second.begin(), messages->second.end(),
+                                         [&](Time a, Time b) { return distance(a) < distance(b); });
+  return distance(nearest) <= kMillisecond ? nearest : messages->second.back();
 }
 
 void Recording::note_overlaps(const Thread &thread, std::size_t position) {
@@ -158,9 +207,14 @@ void Recording::end(const RosEvent &event) {
     ++process.torn_runs;
     return;
   }
-  for (; !is_it(thread.runs.back()); thread.runs.pop_back()) ++process.torn_runs;
+  for (; !is_it(thread.runs.back()); thread.runs.pop_back()) {
+    ++process.torn_runs;
+    leave(thread.runs.back(), event.time);
+  }
   const Run run = std::move(thread.runs.back());
   thread.runs.pop_back();
+  thread.last_end = event.time;
+  leave(run, event.time);
   const Duration whole = std::max<Duration>(event.time - run.start - (thread.absent - run.absent), 0);
   const Duration own = std::max<Duration>(whole - run.inner, 0);
   if (!thread.runs.empty()) thread.runs.back().inner += whole;
@@ -174,6 +228,9 @@ void Recording::end(const RosEvent &event) {
   callback.executed += own;
   Runs &runs = run.sent.empty() ? callback.quiet : callback.publishing;
   runs.execution.add(own);
+  if (callback.ended.size() < kMostRuns) {
+    callback.ended.push_back({run.start, own, run.delay, !run.sent.empty()});
+  }
   if (run.released) runs.response.add(event.time - *run.released);
   for (const Sent &sent : run.sent) {
     CallbackRecord::Output &output = callback.outputs[*sent.topic];
@@ -185,7 +242,9 @@ void Recording::end(const RosEvent &event) {
 void Recording::publish(const RosEvent &event) {
   const auto topic = publishers_.find({event.process, event.handle});
   if (topic == publishers_.end()) return;
-  last_sent_[topic->second] = event.time;
+  std::deque<Time> &messages = sent_[topic->second];
+  messages.push_back(event.time);
+  if (messages.size() > kMostMessages) messages.pop_front();
   Thread &thread = thread_of(event);
   if (thread.runs.empty()) {
     sent_elsewhere_.insert(topic->second);

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <optional>
 #include <set>
@@ -22,11 +23,23 @@ namespace redag::lab {
 
 /// Arrivals that are kept of each callback, for its rate.
 inline constexpr std::size_t kMostArrivals = 4096;
+/// Runs that are kept of each callback, for a simulation that repeats them.
+inline constexpr std::size_t kMostRuns = 16384;
+/// Messages of a topic whose times are kept until a callback takes them.
+inline constexpr std::size_t kMostMessages = 32;
 
 /// Times of runs that ended.
 struct Runs {
   metrics::DurationSketch execution{1024};
   metrics::DurationSketch response{1024};  // since a timer expired, or a callback sent the message
+};
+
+/// A run that ended.
+struct EndedRun {
+  Time start = 0;
+  Duration execution = 0;
+  std::optional<Duration> delay;  // until it began, after its release, and when its thread and its node were free
+  bool publishes = false;
 };
 
 struct CallbackRecord {
@@ -46,8 +59,11 @@ struct CallbackRecord {
   Runs publishing;  // the others
   Duration executed = 0;
   std::map<std::string, Output> outputs;  // by topic
+  std::vector<EndedRun> ended;            // the first ones
   std::vector<Time> begun;                // when the first runs began
   std::vector<Time> sent;                 // when their messages were sent, as far as the middleware says so
+  std::uint64_t node = 0;                 // address
+  std::uint64_t group = 0;                // address of its callback group; 0: unknown
   bool takes_directly = false;            // from its own process, not by the middleware
   std::set<std::size_t> overlaps;         // callbacks of its node that ran at the same time
   std::uint32_t most_at_once = 1;         // of its own runs
@@ -60,9 +76,10 @@ struct ProcessRecord {
   bool has_switches = false;                 // the kernel recorded some of these threads
   std::uint64_t runs = 0;
   Duration executed = 0;
-  std::uint64_t unknown_runs = 0;        // of callbacks whose creation was not recorded
-  std::uint64_t torn_runs = 0;           // begin or end is missing
-  metrics::DurationSketch delays{1024};  // from release to begin, where the former is known
+  std::uint64_t unknown_runs = 0;             // of callbacks whose creation was not recorded
+  std::uint64_t torn_runs = 0;                // begin or end is missing
+  metrics::DurationSketch wake_ups{1024};     // delays of runs whose thread and node were idle
+  metrics::DurationSketch turnarounds{1024};  // of the others
 };
 
 class Recording {
@@ -73,6 +90,10 @@ class Recording {
   [[nodiscard]] const std::map<std::uint32_t, ProcessRecord> &processes() const { return processes_; }
   /// True if messages to this topic came from outside of callbacks, too.
   [[nodiscard]] bool is_sent_elsewhere(const std::string &topic) const { return sent_elsewhere_.contains(topic); }
+  /// True if callbacks of this group never overlap.
+  [[nodiscard]] bool is_exclusive(std::uint32_t process, std::uint64_t group) const {
+    return !reentrant_.contains({process, group});
+  }
   [[nodiscard]] std::uint64_t events() const { return events_; }
   [[nodiscard]] Time first() const { return first_; }
   [[nodiscard]] Time last() const { return last_; }
@@ -83,6 +104,8 @@ class Recording {
   struct Node {
     std::string name;
     std::uint32_t timers = 0;
+    std::size_t running = 0;  // callbacks
+    Time last_end = 0;
   };
   struct Sent {
     const std::string *topic = nullptr;  // in publishers_
@@ -92,8 +115,10 @@ class Recording {
   struct Run {
     std::uint64_t handle = 0;
     std::size_t callback = kUnknown;
+    Node *node = nullptr;  // of the callback, if known
     Time start = 0;
     std::optional<Time> released;
+    std::optional<Duration> delay;
     Duration absent = 0;  // of the thread, when the run began
     Duration inner = 0;   // execution of callbacks that this run called
     std::vector<Sent> sent;
@@ -102,13 +127,17 @@ class Recording {
     std::vector<Run> runs;  // the innermost is last
     Duration absent = 0;    // without a processor so far
     std::optional<Time> left;
+    Time last_end = 0;                // of a run
     std::size_t taken_by = kUnknown;  // whose message was taken last, and when it was sent
     Time sent = 0;
     ProcessRecord *process = nullptr;
   };
 
   void make(const RosEvent &event, Callback::Kind kind);
-  [[nodiscard]] std::optional<Time> release_of(const CallbackRecord &callback, Time start) const;
+  [[nodiscard]] std::optional<Time> release_of(std::size_t callback, const Thread &thread, Time start) const;
+  static std::optional<Duration> note_delay(Time released, Time start, Thread &thread, const Node *node);
+  [[nodiscard]] Node *node_of(std::size_t callback);
+  static void leave(const Run &run, Time now);
   [[nodiscard]] std::size_t find(std::uint32_t process, std::uint64_t address) const;
   Thread &thread_of(const RosEvent &event);
   void bind_subscription(const RosEvent &event);
@@ -121,12 +150,13 @@ class Recording {
   std::vector<CallbackRecord> callbacks_;
   std::map<std::uint32_t, ProcessRecord> processes_;
   std::set<std::string> sent_elsewhere_;
-  std::map<std::string, Time> last_sent_;  // of topics
+  std::map<std::string, std::deque<Time>> sent_;  // the last messages of each topic
   std::uint64_t events_ = 0;
   Time first_ = 0;
   Time last_ = 0;
   // An address can serve a later object: the last one counts.
   std::map<Key, Node> nodes_;
+  std::set<Key> reentrant_;                 // callback groups
   std::map<Key, std::string> publishers_;   // topics
   std::map<Key, std::size_t> addresses_;    // callbacks by all that stands for them
   std::map<Key, std::uint64_t> unclaimed_;  // callbacks of subscriptions' objects that are not known yet

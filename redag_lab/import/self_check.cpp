@@ -11,45 +11,60 @@
 namespace redag::lab {
 namespace {
 
-constexpr Duration kWakeUp = 100 * kMicrosecond;  // of a thread, which the model does not have
 constexpr Duration kLongest = 600 * kSecond;
 
-double error(Duration recorded, Duration simulated) {
+double error(Duration recorded, Duration simulated, Duration noise) {
   const double difference = std::abs(static_cast<double>(simulated - recorded));
-  return difference <= static_cast<double>(kWakeUp) ? 0
-                                                    : difference / static_cast<double>(std::max<Duration>(recorded, 1));
+  return difference <= static_cast<double>(noise) ? 0
+                                                  : difference / static_cast<double>(std::max<Duration>(recorded, 1));
 }
 
 }  // namespace
 
-Result<SelfCheck> check_against_recording(const ImportedWorkload &imported) {
-  Workload workload = imported.workload;
-  auto phase = imported.phases.begin();
-  for (Dag &dag : workload.dags) {
-    for (Task &task : dag.tasks) {
-      if (task.phase == Phase::Unknown) {
-        task.phase = Phase::Common;
-        task.offset = *phase;
-      }
-      ++phase;
-    }
+bool SelfCheck::is_reproduced() const {
+  return std::all_of(tasks.begin(), tasks.end(), [](const ReproducedTask &task) { return task.is_reproduced(); });
+}
+
+Replayed replay(const ImportedWorkload &imported, const Workload &workload) {
+  Replayed replayed{workload, {}};
+  for (const TaskRef &ref : flatten(workload)) {
+    Task &task = replayed.workload.dags[ref.dag.value].tasks[ref.index];
+    if (task.phase != Phase::Unknown) continue;
+    task.phase = Phase::Common;
+    task.offset = imported.replays[ref.id.value].phase;
   }
-  SelfCheck check;
-  check.executor = workload.platform.workers > 1 ? "mte" : "ste";
-  SessionOptions options;
+  SessionOptions &options = replayed.options;
   options.duration = std::clamp<Duration>(imported.length, kSecond, kLongest);
   options.keep_trace = false;
-  options.overheads.dispatch = imported.overhead;
-  const Result<Session> session = run_session(workload, Variant{check.executor, check.executor, {}, false}, options);
+  const auto nth = [](const std::vector<Duration> &values, std::uint32_t number) {
+    return values.empty() ? 0 : values[number % values.size()];
+  };
+  const std::vector<Replay> &replays = imported.replays;
+  options.demand = [&replays, nth](const Task &, TaskId task, std::uint32_t number) {
+    return std::max<Duration>(nth(replays[task.value].demands, number), 1);
+  };
+  options.gap = [&replays, nth](const Task &, TaskId task, std::uint32_t number) {
+    return nth(replays[task.value].gaps, number);
+  };
+  return replayed;
+}
+
+Result<SelfCheck> check_against_recording(const ImportedWorkload &imported) {
+  const Replayed replayed = replay(imported, imported.workload);
+  SelfCheck check;
+  check.executor = imported.workload.platform.workers > 1 ? "mte" : "ste";
+  check.noise = imported.wake_ups.p50;
+  const Result<Session> session =
+      run_session(replayed.workload, Variant{check.executor, check.executor, {}, false}, replayed.options);
   if (!session) return tl::unexpected(session.error());
   for (const metrics::TaskSummary &task : session->summary.tasks) {
-    const metrics::Distribution &recorded = imported.responses[task.task.value];
+    const metrics::Distribution &recorded = imported.replays[task.task.value].responses;
     const metrics::Distribution &simulated = task.jobs.response;
     if (recorded.count == 0 || simulated.count == 0) {
       check.unknown.push_back(task.name);
     } else {
-      check.tasks.push_back(
-          {task.name, recorded, simulated, error(recorded.p50, simulated.p50), error(recorded.p99, simulated.p99)});
+      check.tasks.push_back({task.task, task.name, recorded, simulated, error(recorded.p50, simulated.p50, check.noise),
+                             error(recorded.p99, simulated.p99, check.noise)});
     }
   }
   return check;

@@ -192,6 +192,8 @@ Result<Session> simulate(const Workload &workload, const Variant &variant, Sessi
   simulator.horizon = options.duration;
   simulator.seed = options.seed;
   simulator.overheads = options.overheads;
+  simulator.demand = options.demand;
+  simulator.gap = options.gap;
   const auto scheduler = executors::make_scheduler(variant.executor, workload, info.config);
   const sim::Result result = sim::simulate(workload, *scheduler, info.config.workers, simulator, sink);
 

@@ -40,9 +40,11 @@ struct SessionOptions {
   metrics::FilesOptions files;              // written while the run goes on, and completed by write_session()
   bool keep_trace = true;                   // false: Session::trace has no events
   const std::atomic<bool> *stop = nullptr;  // ends the run early, with the results so far
-  sim::Overheads overheads;                 // simulator
-  std::optional<Calibration> calibration;   // overheads of a machine: simulated; on threads, charged to bounds
-  std::vector<int> cpus;                    // threads only, like the members below
+  sim::Overheads overheads;                 // simulator, like `demand` and `gap`
+  decltype(sim::Options::demand) demand;
+  decltype(sim::Options::gap) gap;
+  std::optional<Calibration> calibration;  // overheads of a machine: simulated; on threads, charged to bounds
+  std::vector<int> cpus;                   // threads only, like the members below
   bool lock_memory = false;
   bool realtime_threads = false;
   Duration spin = 0;

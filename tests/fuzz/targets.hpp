@@ -27,6 +27,8 @@ void units_target(std::string_view input);
 void live_page_target(std::string_view input);
 /// Reads what an executor states of its rates.
 void order_page_target(std::string_view input);
+/// Takes events of ros2_tracing in any order, and makes a workload of every process.
+void recording_target(std::string_view input);
 /// Parses values of the command line and of files: durations, processors, utilizations, patterns of ROS names.
 void values_target(std::string_view input);
 /// Runs every subcommand on a workload that the loader accepts.
@@ -38,10 +40,12 @@ struct Target {
 };
 
 inline constexpr std::array kTargets = {
-    Target{"workload", workload_target},     Target{"plan", plan_target},         Target{"events", events_target},
-    Target{"comparison", comparison_target}, Target{"units", units_target},       Target{"live_page", live_page_target},
-    Target{"values", values_target},         Target{"commands", commands_target}, Target{"robot", robot_target},
-    Target{"order_page", order_page_target},
+    Target{"workload", workload_target},   Target{"plan", plan_target},
+    Target{"events", events_target},       Target{"comparison", comparison_target},
+    Target{"units", units_target},         Target{"live_page", live_page_target},
+    Target{"values", values_target},       Target{"commands", commands_target},
+    Target{"robot", robot_target},         Target{"order_page", order_page_target},
+    Target{"recording", recording_target},
 };
 
 }  // namespace redag::fuzz

@@ -3,14 +3,20 @@
 
 #include <fmt/format.h>
 
+#include <cstdint>
 #include <memory>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "redag/base/text.hpp"
 #include "redag/base/words.hpp"
 #include "redag/loader/provenance.hpp"
-#include "redag_analysis/text/table.hpp"
+#include "redag/loader/validate.hpp"
+#include "redag_lab/cli/import/verdict_report.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/files.hpp"
+#include "redag_lab/cli/terminal/options.hpp"
 #include "redag_lab/cli/terminal/progress.hpp"
 #include "redag_lab/cli/terminal/signals.hpp"
 #include "redag_lab/import/ctf_reader.hpp"
@@ -20,24 +26,31 @@
 namespace redag::cli {
 namespace {
 
+constexpr const char *kEveryProcess = "all";
+
 struct ImportOptions {
   std::string trace;
   std::string file;
   std::string process;
   bool check = false;
+  bool verdict = false;
+  std::uint32_t workers = 0;  // of the verdict, beside the recorded ones; 0: half of these
+  bool json = false;
 };
 
-// Returns the one process to import. Otherwise prints which there are.
-std::optional<std::uint32_t> choose_process(const lab::Recording &recording, const std::string &wanted,
+// Returns the process to import, or with "all" every one that ran callbacks. Otherwise prints which there are.
+std::vector<std::uint32_t> choose_processes(const lab::Recording &recording, const std::string &wanted,
                                             Console &console) {
   std::vector<std::uint32_t> chosen;
   std::vector<std::string> names;
   for (const auto &[process, record] : recording.processes()) {
     if (record.runs == 0) continue;
     names.push_back(fmt::format("{} ({}, {})", process, printable(record.program), plural(record.runs, "run")));
-    if (wanted.empty() || wanted == std::to_string(process) || wanted == record.program) chosen.push_back(process);
+    if (wanted.empty() || wanted == kEveryProcess || wanted == std::to_string(process) || wanted == record.program) {
+      chosen.push_back(process);
+    }
   }
-  if (chosen.size() == 1) return chosen.front();
+  if (chosen.size() == 1 || wanted == kEveryProcess) return chosen;
   if (names.empty()) {
     console.error("the recording has no run of a callback", recording.events() == 0
                                                                 ? "record the events 'ros2:*', as `ros2 trace` does"
@@ -45,9 +58,10 @@ std::optional<std::uint32_t> choose_process(const lab::Recording &recording, con
   } else if (chosen.empty()) {
     console.error(fmt::format("{} ran no callback; these processes did: {}", in_quotes(wanted), join(names)));
   } else {
-    console.error("several processes ran callbacks: " + join(names), "name one of them behind the recording");
+    console.error("several processes ran callbacks: " + join(names),
+                  "name one of them behind the recording, or 'all' for a robot file");
   }
-  return std::nullopt;
+  return {};
 }
 
 // What the file should not hide.
@@ -62,90 +76,94 @@ std::vector<std::string> gaps_of(const lab::ReadTrace &read) {
   return gaps;
 }
 
-// Prints whether the simulator does what the robot did. Returns the exit status.
-int check_model(const lab::ImportedWorkload &imported, Console &console) {
+// Prints whether the simulator does what the robot did, and with `verdict` what other executors would do. Returns the
+// exit status.
+int check_model(const lab::ImportedWorkload &imported, const ImportOptions &options, Console &console) {
   const Result<lab::SelfCheck> check = lab::check_against_recording(imported);
-  if (!check) {
-    console.note(check.error());
-    return kExitBad;
+  if (!ok(check, console)) return kExitBad;
+  if (!options.verdict) {
+    console.say(describe(*check, console.out_traits()));
+    return check->is_reproduced() ? kExitOk : kExitNo;
   }
-  Table table({{.title = "response of"},
-               {.title = "p50"},
-               {.title = "simulated"},
-               {.title = "p99"},
-               {.title = "simulated"},
-               {.title = ""}});
-  std::size_t wrong = 0;
-  for (const lab::ReproducedTask &task : check->tasks) {
-    if (!task.is_reproduced()) ++wrong;
-    table.add({{task.name},
-               {humanize_duration(task.recorded.p50)},
-               {humanize_duration(task.simulated.p50)},
-               {humanize_duration(task.recorded.p99)},
-               {humanize_duration(task.simulated.p99)},
-               {task.is_reproduced() ? "" : "differs", Tint::Bad}});
+  const std::uint32_t recorded = imported.workload.platform.workers;
+  const std::uint32_t other = options.workers > 0 ? options.workers : recorded == 1 ? 2 : (recorded + 1) / 2;
+  const Result<lab::Verdict> verdict = lab::judge(imported, *check, other);
+  if (!ok(verdict, console)) return kExitBad;
+  if (options.json) {
+    console.print(to_text(to_json(*verdict, imported.workload)));
+  } else {
+    console.say(describe(*verdict, imported.workload, console.out_traits()));
   }
-  console.say(table.render(console.out_traits().width, console.out_traits().colour));
-  console.say(fmt::format(
-      "The model of {} reproduces {} of {} (p50 within 10 %, p99 within 25 %, or 100us). Trust no comparison of the "
-      "others.\n",
-      check->executor, check->tasks.size() - wrong, plural(check->tasks.size(), "recorded response")));
-  if (!check->unknown.empty()) {
-    console.say(fmt::format("unknown: when jobs of {} were released\n", join_first(check->unknown, 5)));
-  }
-  return wrong == 0 ? kExitOk : kExitNo;
+  const bool is_fine = verdict->judged() > 0 && check->is_reproduced() && verdict->outcomes.front().missed == 0;
+  return is_fine ? kExitOk : kExitNo;
 }
 
-int import_trace(const ImportOptions &options, Console &console) {
-  if (!options.file.empty()) {
-    if (const Result<void> possible = check_output(options.file); !possible) {
-      console.note(possible.error());
-      return kExitBad;
-    }
-  }
-  lab::Recording recording;
+Result<lab::ReadTrace> read_into(lab::Recording &recording, const std::string &trace, Console &console) {
   const InterruptGuard guard;
   Progress progress(console);
   progress.set_label("reading");
-  const Result<lab::ReadTrace> read = lab::read_ros_trace(
-      options.trace, [&](const lab::RosEvent &event) { recording.add(event); },
+  Result<lab::ReadTrace> read = lab::read_ros_trace(
+      trace, [&](const lab::RosEvent &event) { recording.add(event); },
       [&](double done) {
         if (progress.due()) progress.draw(done, plural(recording.events(), "event") + progress.left(done));
         return !InterruptGuard::interrupted();
       });
   progress.clear();
-  if (!read) {
-    console.note(read.error());
+  return read;
+}
+
+int import_trace(const ImportOptions &options, Console &console) {
+  if (options.process == kEveryProcess && (options.check || options.verdict)) {
+    console.error("--check and --verdict are for one executor: name one process, not 'all'");
     return kExitBad;
   }
-  const std::optional<std::uint32_t> process = choose_process(recording, options.process, console);
-  if (!process) return kExitBad;
-  Result<lab::ImportedWorkload> imported = lab::import_workload(recording, *process);
-  if (!imported) {
-    console.note(imported.error());
-    return kExitBad;
+  if (!options.file.empty() && !ok(check_output(options.file), console)) return kExitBad;
+  lab::Recording recording;
+  const Result<lab::ReadTrace> read = read_into(recording, options.trace, console);
+  if (!ok(read, console)) return kExitBad;
+  const bool is_robot = options.process == kEveryProcess;
+  std::vector<lab::ImportedWorkload> imported;
+  for (const std::uint32_t process : choose_processes(recording, options.process, console)) {
+    Result<lab::ImportedWorkload> one = lab::import_workload(recording, process);
+    if (one) {
+      imported.push_back(*std::move(one));
+    } else if (is_robot) {
+      console.warn(fmt::format("process {} is left out: {}", process, one.error().front().message));
+    } else {
+      console.note(one.error());
+    }
   }
+  if (imported.empty()) return kExitBad;
   for (const std::string &gap : gaps_of(*read)) {
     console.warn(gap);
-    imported->remarks.insert(imported->remarks.begin(), gap);
+    for (lab::ImportedWorkload &one : imported) one.remarks.insert(one.remarks.begin(), gap);
   }
-  const std::string text = provenance_to_comment(current_provenance()) + lab::to_yaml(*imported);
-  if (options.file.empty() && !options.check) {
+  const lab::ImportedWorkload &first = imported.front();
+  const std::string text =
+      provenance_to_comment(current_provenance()) +
+      (is_robot ? lab::to_robot_yaml(imported, static_cast<std::uint32_t>(read->cpus)) : lab::to_yaml(first));
+  if (options.file.empty() && !options.check && !options.verdict) {
     console.print(text);
     return kExitOk;
   }
-  for (const std::string &remark : imported->remarks) console.say(remark + "\n");
-  if (!options.file.empty()) {
-    if (const Result<void> written = write_text(options.file, text); !written) {
-      console.note(written.error());
-      return kExitBad;
-    }
-    console.say(fmt::format("wrote {}: {}, {}, {} left out; its comments say what is assumed, and what is unknown\n",
-                            options.file, plural(imported->workload.dags.size(), "DAG"),
-                            plural(imported->workload.task_count(), "task"),
-                            plural(imported->left_out.size(), "callback")));
+  const auto say = [&](const std::string &line) { options.json ? console.note(line) : console.say(line); };
+  if (!is_robot) {
+    for (const std::string &remark : first.remarks) say(remark + "\n");
   }
-  return options.check ? check_model(*imported, console) : kExitOk;
+  if (!options.file.empty()) {
+    if (!ok(write_text(options.file, text), console)) return kExitBad;
+    std::size_t dags = 0;
+    std::size_t tasks = 0;
+    std::size_t left_out = 0;
+    for (const lab::ImportedWorkload &one : imported) {
+      dags += one.workload.dags.size();
+      tasks += one.workload.task_count();
+      left_out += one.left_out.size();
+    }
+    say(fmt::format("wrote {}: {}, {}, {} left out; its comments say what is assumed, and what is unknown\n",
+                    options.file, plural(dags, "DAG"), plural(tasks, "task"), plural(left_out, "callback")));
+  }
+  return options.check || options.verdict ? check_model(first, options, console) : kExitOk;
 }
 
 }  // namespace
@@ -154,10 +172,20 @@ Action add_import(CLI::App &app) {
   auto options = std::make_shared<ImportOptions>();
   app.add_option("TRACE", options->trace, "Folder that `ros2 trace` or LTTng recorded to: the Common Trace Format")
       ->required();
-  app.add_option("PROCESS", options->process, "Its number or program, if several processes ran callbacks");
+  app.add_option("PROCESS", options->process,
+                 "Its number or program, if several processes ran callbacks; all: a robot file of them");
   app.add_option("-o,--output", options->file, "File to write (default: standard output)")->type_name("FILE");
   app.add_flag("--check", options->check,
                "Simulate the executor that was recorded, and exit with status 1 unless its responses are as recorded");
+  CLI::Option *verdict = app.add_flag(
+      "--verdict", options->verdict,
+      "Say what each executor would do, which deadlines are shown to hold, and what to change; exit with status 1 if "
+      "the recorded executor misses deadlines, or its model differs");
+  add_count(app, "--workers", options->workers, {1, kMaxWorkers},
+            "Threads for a second verdict (default: half the recorded ones)")
+      ->default_str("")
+      ->needs(verdict);
+  app.add_flag("--json", options->json, "Print the verdict as JSON")->needs(verdict);
   return [options](Console &console) { return import_trace(*options, console); };
 }
 

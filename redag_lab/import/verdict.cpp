@@ -1,0 +1,169 @@
+// SPDX-FileCopyrightText: The ReDAG-RT developers
+// SPDX-License-Identifier: Apache-2.0
+
+#include "redag_lab/import/verdict.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+#include <utility>
+
+#include "redag_lab/run/session.hpp"
+#include "redag_lab/run/variant.hpp"
+#include "redag_lab/search/analysed.hpp"
+
+namespace redag::lab {
+namespace {
+
+constexpr std::size_t kMostTried = 8;  // groups and rates: each is a simulation and an analysis
+
+class Judging {
+ public:
+  Judging(const ImportedWorkload &imported, const SelfCheck &check) : imported_(imported), recorded_(check.executor) {
+    verdict_.refused.assign(imported.workload.task_count(), "the recording does not say when its jobs were released");
+    for (const ReproducedTask &task : check.tasks) {
+      verdict_.refused[task.task.value] =
+          task.is_reproduced()
+              ? std::string()
+              : fmt::format("recorded p50 {}, p99 {}; simulated {}, {}", humanize_duration(task.recorded.p50),
+                            humanize_duration(task.recorded.p99), humanize_duration(task.simulated.p50),
+                            humanize_duration(task.simulated.p99));
+    }
+  }
+
+  Result<Verdict> run(std::uint32_t other_workers) {
+    for (const std::uint32_t workers : {imported_.workload.platform.workers, other_workers}) {
+      Workload workload = imported_.workload;
+      workload.platform.workers = workers;
+      for (const std::string &executor : {like_recorded(workers), std::string("redag-none"), std::string("redag-os")}) {
+        Result<Outcome> outcome = outcome_of(workload, executor);
+        if (!outcome) return tl::unexpected(std::move(outcome.error()));
+        verdict_.outcomes.push_back(*std::move(outcome));
+      }
+    }
+    verdict_.changes = {{"ReDAG-RT with preemption none", verdict_.outcomes[1]},
+                        {"ReDAG-RT with preemption os", verdict_.outcomes[2]}};
+    if (const Result<void> tried = try_changes(); !tried) return tl::unexpected(tried.error());
+    keep_best_changes();
+    return std::move(verdict_);
+  }
+
+ private:
+  Result<Outcome> outcome_of(const Workload &workload, const std::string &executor) const {
+    const Result<Variant> variant = parse_variant(executor);
+    if (!variant) return tl::unexpected(variant.error());
+    Replayed replayed = replay(imported_, workload);
+    Result<Session> session = run_session(replayed.workload, *variant, replayed.options);
+    if (!session) return tl::unexpected(std::move(session.error()));
+    Outcome outcome{.executor = executor,
+                    .workers = workload.platform.workers,
+                    .summary = std::move(session->summary),
+                    .held = held_by(workload, *variant)};
+    const std::vector<TaskRef> refs = flatten(workload);
+    for (const metrics::TaskSummary &task : outcome.summary.tasks) {
+      const std::size_t t = task.task.value;
+      if (!verdict_.refused[t].empty()) continue;
+      outcome.released += task.jobs.released;
+      outcome.missed += task.jobs.missed();
+      if (outcome.held[t]) ++outcome.shown;
+      outcome.worst_response = std::max(outcome.worst_response, static_cast<double>(task.jobs.response.p99) /
+                                                                    static_cast<double>(refs[t].task->deadline));
+    }
+    return outcome;
+  }
+
+  // The phases of the recording are those of one start of the robot: the analysis covers all.
+  std::vector<bool> held_by(const Workload &workload, const Variant &variant) const {
+    std::vector<bool> held(workload.task_count(), false);
+    const Result<Workload> configured = configure(workload, variant);
+    if (!configured) return held;
+    analysis::AnalysisPlatform platform = analysis::platform_of(*configured);
+    platform.dispatch_overhead = imported_.overhead;
+    const Result<Analysed> analysed = analyse(*configured, platform, variant.executor);
+    if (!analysed) return held;
+    for (const Row &row : task_rows(*analysed)) held[row.task.value] = row.standing == Standing::Ok;
+    return held;
+  }
+
+  // An executor of one thread becomes another one with more of them.
+  [[nodiscard]] std::string like_recorded(std::uint32_t workers) const { return workers > 1 ? "mte" : recorded_; }
+
+  Result<void> try_change(std::string words, const Workload &changed) {
+    Result<Outcome> outcome = outcome_of(changed, like_recorded(changed.platform.workers));
+    if (!outcome) return tl::unexpected(std::move(outcome.error()));
+    verdict_.changes.push_back({std::move(words), *std::move(outcome)});
+    return {};
+  }
+
+  Result<void> try_changes() {
+    Workload more = imported_.workload;
+    const std::uint32_t workers = more.platform.workers++;
+    if (const Result<void> tried = try_change(fmt::format("{} threads instead of {}", workers + 1, workers), more);
+        !tried) {
+      return tried;
+    }
+    // Tasks by how much they take of a processor.
+    std::vector<TaskRef> refs = flatten(imported_.workload);
+    const auto share = [](const TaskRef &ref) {
+      return static_cast<double>(ref.task->wcet) / static_cast<double>(ref.task->period);
+    };
+    std::stable_sort(refs.begin(), refs.end(), [&](const auto &a, const auto &b) { return share(a) > share(b); });
+    std::size_t groups = 0;
+    std::size_t rates = 0;
+    for (const TaskRef &ref : refs) {
+      if (!ref.task->group.empty() && groups++ < kMostTried) {
+        Workload changed = imported_.workload;
+        task_of(changed, ref).group.clear();
+        const Result<void> tried = try_change(ref.task->name + " in a callback group of its own", changed);
+        if (!tried) return tried;
+      }
+      if (ref.task->activation != Activation::Data && rates++ < kMostTried) {
+        Workload changed = imported_.workload;
+        task_of(changed, ref).period *= 2;
+        inherit_periods(changed.dags[ref.dag.value]);
+        const Result<void> tried =
+            try_change(fmt::format("{} every {} instead of {}", ref.task->name, humanize_duration(2 * ref.task->period),
+                                   humanize_duration(ref.task->period)),
+                       changed);
+        if (!tried) return tried;
+      }
+    }
+    return {};
+  }
+
+  static Task &task_of(Workload &workload, const TaskRef &ref) { return workload.dags[ref.dag.value].tasks[ref.index]; }
+
+  // Rounded, so that chance makes no change better: misses, deadlines that are not shown, and the worst response.
+  [[nodiscard]] std::tuple<double, std::size_t, double> badness(const Outcome &outcome) const {
+    const double missed =
+        static_cast<double>(outcome.missed) / static_cast<double>(std::max<std::uint64_t>(outcome.released, 1));
+    return {std::ceil(missed * 1000), verdict_.judged() - outcome.shown, std::round(outcome.worst_response * 20)};
+  }
+
+  void keep_best_changes() {
+    std::vector<Change> &changes = verdict_.changes;
+    const auto now = badness(verdict_.outcomes.front());
+    std::erase_if(changes, [&](const Change &change) { return badness(change.outcome) >= now; });
+    std::stable_sort(changes.begin(), changes.end(),
+                     [&](const Change &a, const Change &b) { return badness(a.outcome) < badness(b.outcome); });
+    if (changes.size() > kMostChanges) changes.resize(kMostChanges);
+  }
+
+  const ImportedWorkload &imported_;
+  const std::string &recorded_;
+  Verdict verdict_;
+};
+
+}  // namespace
+
+std::size_t Verdict::judged() const {
+  return static_cast<std::size_t>(std::count(refused.begin(), refused.end(), std::string()));
+}
+
+Result<Verdict> judge(const ImportedWorkload &imported, const SelfCheck &check, std::uint32_t other_workers) {
+  return Judging(imported, check).run(other_workers);
+}
+
+}  // namespace redag::lab
