@@ -209,4 +209,20 @@ std::string edit_yaml(std::string_view text, const Workload &wanted, LoadOptions
   return to_yaml(wanted);
 }
 
+int line_of(std::string_view text, DagId dag, std::optional<std::size_t> task, std::string_view key) {
+  const Result<Node> root = yaml::parse(text, {});
+  if (!root) return 0;
+  const auto item = [](const Node &map, std::string_view list, std::size_t index) -> const Node * {
+    const Node *found = yaml::find(map, list);
+    return found != nullptr && index < found->children.size() ? &found->children[index] : nullptr;
+  };
+  const Node *place = item(*root, "dags", dag.value);
+  if (place != nullptr && task) place = item(*place, "tasks", *task);
+  if (place == nullptr) return 0;
+  for (std::size_t i = 0; i + 1 < place->children.size(); i += 2) {
+    if (place->children[i].text == key) return place->children[i].line;
+  }
+  return 0;
+}
+
 }  // namespace redag

@@ -11,7 +11,7 @@
 #include "redag/loader/workload_yaml.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
 #include "redag_analysis/analyze/executors.hpp"
-#include "redag_analysis/many_workers/by_demand.hpp"
+#include "redag_analysis/any_features/by_demand.hpp"
 #include "tests/testing/bound_property.hpp"
 #include "tests/testing/random_workloads.hpp"
 #include "tests/testing/repository.hpp"

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The registry: one line a method, in the order of a report.
+#include "redag_analysis/any_features/by_demand.hpp"
 #include "redag_analysis/core/bound.hpp"
-#include "redag_analysis/many_workers/by_demand.hpp"
 #include "redag_analysis/many_workers/dag_isolated.hpp"
 #include "redag_analysis/many_workers/dag_shapes.hpp"
 #include "redag_analysis/many_workers/global_dag.hpp"

@@ -213,8 +213,8 @@ class Resolver {
   Duration jitter_of_number(std::uint32_t u) const {
     const Unit &unit = task_set_.units[u];
     const CompiledTask &first = task_set_.tasks[unit.tasks.front()];
-    // A timer's job becomes ready before the next release is seen, or is skipped.
-    if (!first.data) return add(unit.period, unit.jitter);
+    // A timer's job becomes ready before the next release that is not refused is seen, or is skipped.
+    if (!first.data) return add(first.replaced, unit.jitter);
     // Each job takes a datum of every predecessor, of which one can be from before the interval. The jobs that complete
     // in the interval became ready in it, were ready before, or had started.
     Duration least = kUnbounded;
@@ -223,9 +223,12 @@ class Resolver {
       if (before.period != unit.period) continue;
       const Unit &from = task_set_.units[before.unit];
       const Duration number = from.awaits.empty() ? from.jitter : std::max(from.jitter, jitter_of_number(before.unit));
-      const auto hops = static_cast<Duration>(from.tasks.size());
-      const Duration ready = std::max<Duration>(1, before.limit / before.period);
-      least = std::min(least, add(number, multiply(unit.period, hops * (ready + 2))));
+      Duration unfinished = 0;
+      for (const std::uint32_t t : from.tasks) {
+        const CompiledTask &task = task_set_.tasks[t];
+        unfinished = add(unfinished, std::max<Duration>(1, task.limit / task.period) + 1 + task.at_once);
+      }
+      least = std::min(least, add(number, multiply(unit.period, unfinished)));
     }
     return least;
   }

@@ -39,6 +39,11 @@ class Compiler {
         std::none_of(workload.dags.begin(), workload.dags.end(), has_region)) {
       task_set_.mode = sched::Preemption::None;
     }
+    std::set<std::string> groups;
+    for (const TaskRef &ref : flatten(workload)) {
+      if (!ref.task->group.empty() && !groups.insert(ref.task->group).second) shared_groups_.insert(ref.task->group);
+      has_modes_ = has_modes_ || (ref.task->wcet_low > 0 && ref.task->wcet_low < ref.task->wcet);
+    }
     find_losses();
   }
 
@@ -96,6 +101,14 @@ class Compiler {
            task_set_.platform.preempt_overhead > 0;
   }
 
+  // The most jobs that a job takes a worker from, waits aside: one when it starts, one when a holder of its group
+  // inherits from it. If it is demoted, a job that was preempted before takes its own.
+  [[nodiscard]] Duration preemptions_by(const Dag &dag, const Task &task) const {
+    const bool is_limited = task.budget > 0 && task.budget < task.wcet && task.on_budget == OnBudget::Demote;
+    const bool can_sink = is_limited || (has_modes_ && dag.criticality != Criticality::High);
+    return 1 + (shared_groups_.contains(task.group) ? 1 : 0) + (can_sink ? 1 : 0);
+  }
+
   // Finds the time in which the bounds assume that nothing runs. It is sound to count each loss on one processor as one
   // on all.
   void find_losses() {
@@ -113,11 +126,10 @@ class Compiler {
       for (const Task &task : dag.tasks) {
         const Duration late = ceil_div(add(task.jitter, platform.lateness), std::max<Duration>(task.period, 1));
         if (task.activation == Activation::Timer) add_releases(platform.timer_overhead, task, late + 1);
-        // A job preempts at most once, when it becomes eligible, and once at each wake-up; this includes jobs released
-        // before the window. A job that waits for its group can make the holder preempt, too.
-        const Duration waiting = task.overrun == Overrun::Queue ? task.queue_depth : 1;
-        const Duration times = (task.group.empty() ? 1 : 2) + static_cast<Duration>(task.waits.size());
-        if (preemptions_freeze()) add_releases(multiply(platform.preempt_overhead, times), task, late + waiting + 2);
+        // A job also preempts at each wake-up. This includes jobs released before the window.
+        const Duration waiting = (task.overrun == Overrun::Queue ? task.queue_depth : 1) + task.concurrency;
+        const Duration times = preemptions_by(dag, task) + static_cast<Duration>(task.waits.size());
+        if (preemptions_freeze()) add_releases(multiply(platform.preempt_overhead, times), task, late + waiting + 1);
       }
     }
     task_set_.frozen = lost_.per_second < kSecond ? lengthened(lost_.longest) : 0;
@@ -196,10 +208,10 @@ class Compiler {
     CompiledTask compiled;
     compiled.name = dag.name + "." + task.name;
     compiled.dag = DagId(task_set_.dags.size());
-    // The job that preempts pays for the resumption; a job preempts at most once, when it starts.
+    // The job that preempts pays for the resumption.
     const Duration lead = add(platform.release_overhead, platform.dispatch_overhead);
     const bool pays = task_set_.mode != sched::Preemption::None && !preemptions_freeze();
-    const Duration resumptions = (pays ? 1 : 0) + static_cast<Duration>(task.waits.size());  // one after each wait
+    const Duration resumptions = (pays ? preemptions_by(dag, task) : 0) + static_cast<Duration>(task.waits.size());
     const Duration overhead = add(lead, multiply(platform.preempt_overhead, resumptions));
     compiled.wcet = lengthened(add(task.wcet, overhead));
     compiled.overhead = compiled.wcet - task.wcet;
@@ -419,6 +431,8 @@ class Compiler {
   }
 
   std::string modes_;  // why there is a HI mode
+  bool has_modes_ = false;
+  std::set<std::string> shared_groups_;
   const Workload &workload_;
   const std::vector<WaitingTime> waits_;  // by TaskId; empty: no task waits
   TaskSet task_set_;

@@ -61,8 +61,10 @@ Score score_of_bounds(const analysis::TaskSet &task_set) {
   score.proven = report.verdict == analysis::Verdict::Schedulable;
   const auto see = [&score](const analysis::Tightest &tightest, Duration due) {
     ++score.judged;
-    if (!tightest.response || tightest.bound.of_ended || *tightest.response > due) ++score.missed;
-    if (!tightest.response) {
+    // A response of the jobs that end says nothing about those that are lost.
+    const bool is_bounded = tightest.response && !tightest.bound.of_ended;
+    if (!is_bounded || *tightest.response > due) ++score.missed;
+    if (!is_bounded) {
       ++score.lost;
     } else {
       score.see(*tightest.response, due);

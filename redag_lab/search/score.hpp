@@ -29,7 +29,7 @@ struct Score {
   bool proven = false;          // bounds show that every deadline is met
   std::uint64_t judged = 0;     // jobs released, or deadlines
   std::uint64_t missed = 0;     // lost or late; or not shown to be met
-  std::uint64_t lost = 0;       // skipped, or aborted although there was data; or without a bound
+  std::uint64_t lost = 0;       // skipped, or aborted although there was data; or without a bound of all jobs
   std::optional<double> slack;  // the least (deadline - response) / deadline, of jobs or bounds
   std::uint32_t changes = 0;    // number of differences from the present workload
 

@@ -269,6 +269,14 @@ TEST(TuneByBounds, FewerWithoutABoundComeFirst) {
   EXPECT_TRUE(is_better(one, two, Judge::Bounds));
 }
 
+TEST(TuneByBounds, JobsThatCanBeLostHaveNoSlack) {
+  Workload workload = independent({{3, 10}, {6, 20, 2}});
+  workload.dags[1].tasks[0].budget = 4;
+  const Score score = by_bounds(workload).present.score;
+  EXPECT_EQ(score.lost, 1U) << "a job that is cut off has no response";
+  EXPECT_EQ(score.slack, 0.7);
+}
+
 TEST(TuneByBounds, ABoundOfActiveJobsIsolatesADag) {
   // On 3 workers, without preemption, "wide" can fill all workers and block "quick" for 40. With at most 2 active jobs
   // of "wide", "quick" always finds a worker.

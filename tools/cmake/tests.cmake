@@ -13,7 +13,7 @@ set(executors redag_analysis/executors)
 set(metrics redag_analysis/metrics)
 set(sim redag_analysis/sim)
 set(text redag_analysis/text)
-set(analysis redag_analysis/core redag_analysis/one_worker redag_analysis/many_workers
+set(analysis redag_analysis/core redag_analysis/one_worker redag_analysis/many_workers redag_analysis/any_features
   redag_analysis/peers redag_analysis/analyze)
 foreach(group IN ITEMS workload run search report experiment robot import doctor cli)
   set(${group} redag_lab/${group})

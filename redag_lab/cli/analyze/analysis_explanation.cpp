@@ -9,9 +9,11 @@
 #include <optional>
 
 #include "redag/base/text.hpp"
+#include "redag/loader/workload_yaml_edit.hpp"
 #include "redag_analysis/text/rounded_time.hpp"
 #include "redag_analysis/text/table.hpp"
 #include "redag_lab/cli/terminal/options.hpp"
+#include "redag_lab/search/obstacle.hpp"
 
 namespace redag::cli {
 namespace {
@@ -148,6 +150,22 @@ std::string explain_bound(const lab::Analysed &analysed, const lab::Row &row, co
   return text;
 }
 
+// Names the key without which the row stands better, with its line, and what it then has.
+std::string name_obstacle(const lab::Analysed &analysed, const lab::Row &row, const SourceText &source) {
+  const std::optional<lab::Obstacle> found = lab::find_obstacle(analysed, row);
+  if (!found) return {};
+  const analysis::CompiledDag &dag = analysed.task_set.dags[found->dag.value];
+  std::optional<std::size_t> number;
+  if (found->task.valid()) number = found->task.value - dag.tasks.front();
+  const int line = source.dags.empty() ? 0 : line_of(source.text, source.dags[found->dag.value], number, found->key);
+  const std::string place = line > 0 ? fmt::format("{}:{}: ", source.file, line) : std::string{};
+  const std::string response =
+      found->response ? ", response time at most " + humanize_up(*found->response) : std::string{};
+  return fmt::format("in the way: {}{} of {}; without it: {}{}\n", place, found->key,
+                     found->task.valid() ? task_name(analysed, found->task) : dag.name, to_string(found->standing),
+                     response);
+}
+
 // Returns the reason why there is no bound, the methods that gave up or do not apply, and the load.
 std::string explain_absence(const lab::Analysed &analysed, const lab::Row &row) {
   std::string text = fmt::format("reason for the missing bound: {}\n", row.reason);
@@ -194,7 +212,8 @@ Result<lab::Row> find_row(const lab::Analysed &analysed, const std::string &name
   return make_error("there is no task or DAG " + in_quotes(name), suggestion(name, names));
 }
 
-std::string explain(const lab::Analysed &analysed, const lab::Row &row, const StreamTraits &terminal) {
+std::string explain(const lab::Analysed &analysed, const lab::Row &row, const StreamTraits &terminal,
+                    const SourceText &source) {
   std::string text = tinted(row.name, Tint::Strong, terminal.colour) + ": ";
   if (row.tightest.response) {
     text += fmt::format("response time at most {}, ", humanize_up(*row.tightest.response));
@@ -210,6 +229,9 @@ std::string explain(const lab::Analysed &analysed, const lab::Row &row, const St
                         humanize_duration(*row.due));
   }
   text += row.tightest.response ? explain_bound(analysed, row, terminal) : explain_absence(analysed, row);
+  if (row.standing != lab::Standing::Ok && row.standing != lab::Standing::NoDeadline) {
+    text += name_obstacle(analysed, row, source);
+  }
   const bool is_open = row.due && (row.standing == lab::Standing::MayMiss || row.standing == lab::Standing::MayLose ||
                                    row.standing == lab::Standing::NoBound);
   if (is_open && analysed.report.verdict != analysis::Verdict::Schedulable) {

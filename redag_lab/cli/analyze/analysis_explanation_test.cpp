@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "redag/loader/workload_yaml.hpp"
 #include "tests/testing/builders.hpp"
 
 namespace redag::cli {
@@ -151,6 +152,29 @@ TEST(Explanation, SaysWhenADeadlineBeyondThePeriodCannotBeUsed) {
   row->due = 20 * kMillisecond;
   EXPECT_THAT(explain(analysed, *row, StreamTraits{}),
               HasSubstr("judged at 20ms: after that, the next release would skip"));
+}
+
+TEST(Explanation, NamesTheLineThatIsInTheWay) {
+  const std::string text = R"(platform: {workers: 1, preemption: os}
+dags:
+  - name: a
+    tasks:
+      - name: t
+        wcet: 2ms
+        period: 10ms
+        budget: 1ms
+  - name: b
+    tasks: [{name: t, wcet: 1ms, period: 20ms, budget: 500us}]
+)";
+  const Result<LoadedWorkload> loaded = parse_workload(text, "case.yaml");
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  const lab::Analysed analysed = look_at(loaded->workload);
+  const SourceText source{"case.yaml", text, {DagId(0), DagId(1)}};
+  EXPECT_THAT(explain(analysed, row_of(analysed, "a.t"), StreamTraits{}, source),
+              HasSubstr("in the way: case.yaml:8: budget of a.t; without it: ok, response time at most 2ms\n"));
+  // The more urgent task takes nothing from b.t, whose own budget does.
+  EXPECT_THAT(explain(analysed, row_of(analysed, "b.t"), StreamTraits{}, source),
+              HasSubstr("in the way: case.yaml:10: budget of b.t; without it: ok, response time at most 3ms\n"));
 }
 
 }  // namespace

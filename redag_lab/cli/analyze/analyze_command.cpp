@@ -55,6 +55,7 @@ struct Asked {
   std::vector<lab::Margin> margins;  // of --sensitivity
   bool all_margins = true;           // false: stopped before the last one
   std::optional<lab::Row> row;       // of --explain
+  SourceText source;                 // likewise
 };
 
 // Returns where a task or DAG of this name is, or the error of the part with the nearest name.
@@ -88,7 +89,8 @@ Result<std::size_t> part_with_chain(const Parts &parts, const std::string &chain
 }
 
 // Finds what is asked of each part. Returns nothing, with an error on the console, if a task is unknown.
-std::optional<std::vector<Asked>> find_asked(const Parts &parts, const AnalyzeOptions &options, Console &console) {
+std::optional<std::vector<Asked>> find_asked(const Parts &parts, const AnalyzeOptions &options,
+                                             const std::string &source, Console &console) {
   std::vector<Asked> asked(parts.size());
   const auto refuse = [&console](const char *option, const Diagnostics &why) {
     console.error(fmt::format("{}: {}", option, why.front().message), why.front().hint);
@@ -105,6 +107,7 @@ std::optional<std::vector<Asked>> find_asked(const Parts &parts, const AnalyzeOp
     const Result<std::size_t> part = part_with(parts, options.explain);
     if (!part) return refuse("--explain", part.error());
     asked[*part].row = find_row(parts[*part].analysed, options.explain).value();
+    asked[*part].source = {options.analysis.run.file, source, parts[*part].part.dags};
   }
   return asked;
 }
@@ -124,7 +127,7 @@ std::string text_of(const lab::AnalysedPart &part, const Asked &asked, const Ana
   const bool every_task = options.analysis.run.all_tasks;
   std::string text;
   if (asked.row) {
-    text = explain(part.analysed, *asked.row, terminal);
+    text = explain(part.analysed, *asked.row, terminal, asked.source);
   } else if (options.explain.empty()) {
     text = heading(part.part, terminal);
     text +=
@@ -142,7 +145,8 @@ Json json_of(const lab::AnalysedPart &part, const Asked &asked, const AnalyzeOpt
     document["sensitivity"] = {{"complete", asked.all_margins}, {"limits", to_json(part.analysed, asked.margins)}};
   }
   if (asked.row) {
-    document["explanation"] = {{"name", asked.row->name}, {"text", explain(part.analysed, *asked.row, StreamTraits{})}};
+    document["explanation"] = {{"name", asked.row->name},
+                               {"text", explain(part.analysed, *asked.row, StreamTraits{}, asked.source)}};
   }
   return document;
 }
@@ -190,8 +194,9 @@ void find_margins(const lab::Analysed &analysed, AnalysisWatch &watch, Asked &as
 }
 
 // Reports one task or DAG in words, or the whole analysis. Returns false if that task or DAG is unknown.
-bool report(const Parts &parts, const AnalyzeOptions &options, AnalysisWatch &watch, Console &console) {
-  std::optional<std::vector<Asked>> asked = find_asked(parts, options, console);
+bool report(const Parts &parts, const AnalyzeOptions &options, const std::string &source, AnalysisWatch &watch,
+            Console &console) {
+  std::optional<std::vector<Asked>> asked = find_asked(parts, options, source, console);
   if (!asked) return false;
   for (std::size_t p = 0; options.sensitivity && p < parts.size(); ++p) {
     find_margins(parts[p].analysed, watch, (*asked)[p], console);
@@ -239,14 +244,15 @@ int analyze_file(const AnalyzeOptions &options, Console &console) {
                   fmt::format("leave out {} or --executor", ours));
     return kExitBad;
   }
-  const std::optional<Workload> workload = load_configured(options.analysis.run, console, {.waits = true});
+  std::string source;
+  const std::optional<Workload> workload = load_configured(options.analysis.run, console, {.waits = true}, &source);
   if (!workload || !takes_arguments({*lab::parse_variant(options.executor)}, options.analysis.run, console))
     return kExitBad;
   const InterruptGuard guard;
   AnalysisWatch watch(options.analysis, console);
   const Result<Parts> analysed = analyse_configured(*workload, options, watch);
   if (!ok(analysed, console)) return kExitBad;
-  if (!report(*analysed, options, watch, console)) return kExitBad;
+  if (!report(*analysed, options, source, watch, console)) return kExitBad;
   return options.analysis.run.check && !lab::is_schedulable(*analysed) ? kExitNo : kExitOk;
 }
 

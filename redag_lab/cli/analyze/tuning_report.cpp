@@ -189,7 +189,7 @@ std::string in_words(const Tuning &tuning) {
   } else if (tuned.rejected()) {
     text += "nothing to change: the best setting of the search is worse on the unseen seeds\n" + gains(tuning);
   } else if (tuning.options.judge == Judge::Bounds && !tuned.present.score.slack) {
-    text += "nothing to compare: no method bounds any response time, whatever was tried; see 'redag analyze'\n";
+    text += "nothing to compare: no task has a bound for all of its jobs, whatever was tried; see 'redag analyze'\n";
   } else {
     text += fmt::format("nothing to change: no other setting that was tried {}\n",
                         tuning.options.judge == Judge::Bounds ? "has better bounds" : "misses fewer deadlines");
