@@ -41,9 +41,6 @@ constexpr std::array kTaskFields = {
     Field::Activation, Field::After,   Field::Overrun,  Field::Priority,    Field::Execution, Field::Callback,
     Field::OnBudget,   Field::WcetLow, Field::Segments, Field::Rate};
 
-constexpr std::array kCriticalities = {Criticality::Low, Criticality::Normal, Criticality::High};
-constexpr std::array kEdges = {Edges::Executed, Edges::Seen};
-constexpr std::array kOnBudgets = {OnBudget::Abort, OnBudget::Log, OnBudget::Demote, OnBudget::SkipNext};
 /// `activation` in a file says what releases a task, and of a timer task whether it is a timer at all.
 enum class Released : std::uint8_t { ByTimer, ByData, ByEvent };
 constexpr std::array kReleased = {Released::ByTimer, Released::ByData, Released::ByEvent};
@@ -55,13 +52,6 @@ const char *to_string(Released value) {
   }
   return to_string(Activation::Timer);
 }
-constexpr std::array kPolicies = {PolicyKind::RateMonotonic, PolicyKind::DeadlineMonotonic,
-                                  PolicyKind::Fixed,         PolicyKind::Edf,
-                                  PolicyKind::Fifo,          PolicyKind::ChainAware};
-constexpr std::array kTies = {Ties::Share, Ties::Fixed};
-constexpr std::array kPreemptionModes = {PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Os,
-                                         PreemptionMode::Auto};
-
 /// A map of the file, and which of its values could not be read. Findings that depend on those are not reported.
 struct Part {
   const Node *node = nullptr;
@@ -138,10 +128,9 @@ class Reader : private yaml::ValueReader {
     take(part, field, out,
          [&](const Node &node, std::string_view key) { return integer<std::uint32_t>(node, key, 1, most); });
   }
-  template <class Enum, std::size_t N>
-  void take_enum(Part &part, Field field, Enum &out, const std::array<Enum, N> &values) {
-    take(part, field, out,
-         [&](const Node &node, std::string_view key) { return one_of(node, key, std::span<const Enum>(values)); });
+  template <class Enum>
+  void take_enum(Part &part, Field field, Enum &out) {
+    take(part, field, out, [this](const Node &node, std::string_view key) { return one_of<Enum>(node, key); });
   }
 
   /// Returns the items of a list. The list may be absent or null: validate.hpp then reports what is missing.
@@ -165,8 +154,8 @@ class Reader : private yaml::ValueReader {
     if (!check_map(*root_.node, "a workload", names_of(kTopFields))) return;
     structure_known_ = true;
     take_text(root_, Field::Name, workload_.name);
-    take_enum(root_, Field::Policy, workload_.policy, kPolicies);
-    take_enum(root_, Field::Ties, workload_.ties, kTies);
+    take_enum(root_, Field::Policy, workload_.policy);
+    take_enum(root_, Field::Ties, workload_.ties);
     read_platform();
     const std::vector<Node> *dags = take_list(root_, Field::Dags);
     if (dags == nullptr) return;
@@ -185,7 +174,7 @@ class Reader : private yaml::ValueReader {
     }
     take_workers(platform_, workload_.platform.workers, workload_.platform.cpus);
     read_clusters();
-    take_enum(platform_, Field::Preemption, workload_.platform.preemption, kPreemptionModes);
+    take_enum(platform_, Field::Preemption, workload_.platform.preemption);
     take(platform_, Field::Devices, workload_.platform.devices,
          [this](const Node &value, std::string_view) { return devices(value); });
     root_.broken |= platform_.broken;
@@ -245,9 +234,9 @@ class Reader : private yaml::ValueReader {
     take_positive_duration(part, Field::Deadline, dag.deadline);
     take_count(part, Field::MaxActive, dag.max_active, kMaxBound);
     take_count(part, Field::MaxPending, dag.max_pending, kMaxBound);
-    take_enum(part, Field::Criticality, dag.criticality, kCriticalities);
+    take_enum(part, Field::Criticality, dag.criticality);
     take_degrade(dag.degrade, part);
-    take_enum(part, Field::Edges, dag.edges, kEdges);
+    take_enum(part, Field::Edges, dag.edges);
     const std::vector<Node> *tasks = take_list(part, Field::Tasks);
     if (tasks == nullptr) return;
     dag.tasks.resize(tasks->size());
@@ -275,7 +264,7 @@ class Reader : private yaml::ValueReader {
     take_duration(part, Field::Jitter, task.jitter);
     take_positive_duration(part, Field::Region, task.region);
     take_positive_duration(part, Field::Budget, task.budget);
-    take_enum(part, Field::OnBudget, task.on_budget, kOnBudgets);
+    take_enum(part, Field::OnBudget, task.on_budget);
     take_positive_duration(part, Field::WcetLow, task.wcet_low);
     take_count(part, Field::Concurrency, task.concurrency, kMaxConcurrency);
     take_text(part, Field::Group, task.group);
@@ -293,7 +282,9 @@ class Reader : private yaml::ValueReader {
 
   void take_activation(Task &task, TaskPart &part) {
     Released released = Released::ByTimer;
-    take_enum(part, Field::Activation, released, kReleased);
+    take(part, Field::Activation, released, [this](const Node &node, std::string_view key) {
+      return one_of(node, key, std::span<const Released>(kReleased));
+    });
     if (released == Released::ByData) task.activation = Activation::Data;
     if (released == Released::ByEvent) task.phase = Phase::Event;
   }
@@ -310,7 +301,7 @@ class Reader : private yaml::ValueReader {
   /// The scheduler only uses the DAG's criticality. Warns if a task has another one, which would have no effect.
   void take_criticality(Task &task, TaskPart &part) {
     const Criticality of_dag = task.criticality;
-    take_enum(part, Field::Criticality, task.criticality, kCriticalities);
+    take_enum(part, Field::Criticality, task.criticality);
     if (task.criticality == of_dag) return;
     const Node &at = *find(part, Field::Criticality);
     diagnostics_.push_back(Diagnostic{Severity::Warning, file_, at.line, at.column,

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include <algorithm>
-#include <array>
 
 #include <fmt/format.h>
 
@@ -13,20 +12,18 @@ namespace {
 
 using Kind = Callback::Kind;
 
-constexpr std::array kKinds = {Kind::Timer,  Kind::Subscription, Kind::Service,
-                               Kind::Client, Kind::Action,       Kind::Waitable};
-
 std::optional<Kind> kind_of(std::string_view key) {
-  const auto *const found =
-      std::find_if(kKinds.begin(), kKinds.end(), [key](Kind kind) { return to_string(kind) == key; });
-  return found == kKinds.end() ? std::nullopt : std::optional(*found);
+  for (const Named<Kind> &kind : kValues<Kind>) {
+    if (kind.name == key) return kind.value;
+  }
+  return std::nullopt;
 }
 
 }  // namespace
 
 std::optional<Callback> ValueReader::callback(const Node &node) {
   std::vector<std::string_view> keys = {"node"};
-  for (const Kind kind : kKinds) keys.emplace_back(to_string(kind));
+  for (const Named<Kind> &kind : kValues<Kind>) keys.emplace_back(kind.name);
   if (!check_map(node, "callback", keys)) return std::nullopt;
   Callback callback;
   const Node *kind_value = nullptr;

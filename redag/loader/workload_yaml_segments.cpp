@@ -41,8 +41,7 @@ std::optional<std::vector<Device>> ValueReader::devices(const Node &node) {
       device.slots = count.value_or(1);
     }
     if (const Node *queue = find(value, "queue")) {
-      constexpr std::array kQueues = {Device::Queue::Priority, Device::Queue::Fifo};
-      const auto order = one_of(*queue, "queue", std::span<const Device::Queue>(kQueues));
+      const auto order = one_of<Device::Queue>(*queue, "queue");
       sound = sound && order;
       device.queue = order.value_or(Device::Queue::Priority);
     }

@@ -84,7 +84,13 @@ class ValueReader {
 
   std::optional<double> real(const Node &node, std::string_view key);
 
-  /// Reads a choice, as to_string() writes it.
+  template <class Enum>
+  std::optional<Enum> one_of(const Node &node, std::string_view key) {
+    std::vector<Enum> values;
+    for (const Named<Enum> &named : kValues<Enum>) values.push_back(named.value);
+    return one_of(node, key, std::span<const Enum>(values));
+  }
+  /// Reads a choice of these, as to_string() writes it.
   template <class Enum>
   std::optional<Enum> one_of(const Node &node, std::string_view key, std::span<const Enum> values) {
     std::vector<std::string_view> names;

@@ -5,6 +5,7 @@
 // values: no behaviour, no validation (see validate.hpp), no text form (see workload_yaml.hpp).
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -238,18 +239,62 @@ struct TaskRef {
 /// period where none is set (0). Requires acyclic edges.
 void inherit_periods(Dag &dag);
 
-[[nodiscard]] const char *to_string(Criticality value);
-[[nodiscard]] const char *to_string(Activation value);
-[[nodiscard]] const char *to_string(Edges value);
+/// A value of an enumeration, and its name in files and options.
+template <class Enum>
+struct Named {
+  Enum value;
+  const char *name;
+};
+template <class Enum>
+Named(Enum, const char *) -> Named<Enum>;
+
+/// All values of an enumeration of workloads, in the order in which messages list them. Empty for other types.
+template <class Enum>
+inline constexpr std::array<Named<Enum>, 0> kValues{};
+template <>
+inline constexpr std::array kValues<Criticality> = {
+    Named{Criticality::Low, "low"}, Named{Criticality::Normal, "normal"}, Named{Criticality::High, "high"}};
+template <>
+inline constexpr std::array kValues<Activation> = {Named{Activation::Timer, "timer"}, Named{Activation::Data, "data"}};
+template <>
+inline constexpr std::array kValues<Edges> = {Named{Edges::Executed, "executed"}, Named{Edges::Seen, "seen"}};
+template <>
+inline constexpr std::array kValues<Callback::Kind> = {
+    Named{Callback::Kind::Timer, "timer"},     Named{Callback::Kind::Subscription, "subscription"},
+    Named{Callback::Kind::Service, "service"}, Named{Callback::Kind::Client, "client"},
+    Named{Callback::Kind::Action, "action"},   Named{Callback::Kind::Waitable, "waitable"}};
+template <>
+inline constexpr std::array kValues<OnBudget> = {Named{OnBudget::Abort, "abort"}, Named{OnBudget::Log, "log"},
+                                                 Named{OnBudget::Demote, "demote"},
+                                                 Named{OnBudget::SkipNext, "skip_next"}};
+template <>
+inline constexpr std::array kValues<PolicyKind> = {Named{PolicyKind::RateMonotonic, "rate_monotonic"},
+                                                   Named{PolicyKind::DeadlineMonotonic, "deadline_monotonic"},
+                                                   Named{PolicyKind::Fixed, "fixed"},
+                                                   Named{PolicyKind::Edf, "edf"},
+                                                   Named{PolicyKind::Fifo, "fifo"},
+                                                   Named{PolicyKind::ChainAware, "chain_aware"}};
+template <>
+inline constexpr std::array kValues<Ties> = {Named{Ties::Share, "share"}, Named{Ties::Fixed, "fixed"}};
+template <>
+inline constexpr std::array kValues<PreemptionMode> = {
+    Named{PreemptionMode::None, "none"}, Named{PreemptionMode::Cooperative, "cooperative"},
+    Named{PreemptionMode::Os, "os"}, Named{PreemptionMode::Auto, "auto"}};
+template <>
+inline constexpr std::array kValues<Device::Queue> = {Named{Device::Queue::Priority, "priority"},
+                                                      Named{Device::Queue::Fifo, "fifo"}};
+
+/// Returns the name of a value, or "?".
+template <class Enum>
+requires(!kValues<Enum>.empty()) [[nodiscard]] const char *to_string(Enum value) {
+  for (const Named<Enum> &named : kValues<Enum>) {
+    if (named.value == value) return named.name;
+  }
+  return "?";
+}
 
 /// How a file states the phases of a task: `activation: event`, `offset: any`.
 inline constexpr const char *kEventActivation = "event";
 inline constexpr const char *kAnyOffset = "any";
-[[nodiscard]] const char *to_string(Callback::Kind value);
-[[nodiscard]] const char *to_string(OnBudget value);
-[[nodiscard]] const char *to_string(PolicyKind value);
-[[nodiscard]] const char *to_string(Ties value);
-[[nodiscard]] const char *to_string(PreemptionMode value);
-[[nodiscard]] const char *to_string(Device::Queue value);
 
 }  // namespace redag

@@ -20,9 +20,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::array kPolicies = {PolicyKind::RateMonotonic, PolicyKind::DeadlineMonotonic,
-                                  PolicyKind::Fixed,         PolicyKind::Edf,
-                                  PolicyKind::Fifo,          PolicyKind::ChainAware};
 constexpr std::array kPreemptions = {sched::Preemption::None, sched::Preemption::Cooperative, sched::Preemption::Full};
 constexpr std::array kDrivers = {Driver::Simulator, Driver::Threads, Driver::Ros, Driver::RosNodes};
 
@@ -73,6 +70,12 @@ auto one_of(const Values &values, Name name, const std::string &text, const char
   throw BadValue(std::string("'") + key + "' has the unknown value '" + text + "'");
 }
 
+template <class Enum>
+Enum one_of(const std::string &text, const char *key) {
+  const auto name = [](const Named<Enum> &named) { return named.name; };
+  return one_of(kValues<Enum>, name, text, key).value;
+}
+
 sched::Config config_from(const Json &json) {
   constexpr std::uint32_t kAny = std::numeric_limits<std::uint32_t>::max();
   sched::Config config;
@@ -80,15 +83,10 @@ sched::Config config_from(const Json &json) {
   std::string preemption = text_of(json, "preemption");
   if (preemption == "full") preemption = preemption_name(sched::Preemption::Full);  // in older files
   config.preemption = one_of(kPreemptions, preemption_name, preemption, "preemption");
-  config.policy = one_of(
-      kPolicies, [](PolicyKind p) { return to_string(p); }, text_of(json, "policy"), "policy");
+  config.policy = one_of<PolicyKind>(text_of(json, "policy"), "policy");
   // Files from before ties were shared do not state them; their order was fixed.
-  constexpr std::array kTies = {Ties::Share, Ties::Fixed};
   config.ties = Ties::Fixed;
-  if (json.contains("ties")) {
-    config.ties = one_of(
-        kTies, [](Ties ties) { return to_string(ties); }, text_of(json, "ties"), "ties");
-  }
+  if (json.contains("ties")) config.ties = one_of<Ties>(text_of(json, "ties"), "ties");
   config.levels = small_of(json, "levels", 0, kAny);
   config.max_started = small_of(json, "max_started", 0, kAny);
   return config;

@@ -81,7 +81,8 @@ class FactorialReader : private PlanReader {
     take(root_, "warm_up", plan_.warm_up);
     read_overheads();
     read_workloads();
-    take_list("policies", plan_.policies, kPolicies);
+    take_list("policies", plan_.policies,
+              [this](const Node &node, std::string_view key) { return one_of<PolicyKind>(node, key); });
     take_list("workers", plan_.workers);
     take_range("utilization", plan_.utilization);
     take_range("demand_scale", plan_.demand_scale);

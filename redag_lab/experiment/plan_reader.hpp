@@ -23,10 +23,6 @@
 
 namespace redag::experiment {
 
-inline constexpr std::array kPolicies = {PolicyKind::RateMonotonic, PolicyKind::DeadlineMonotonic,
-                                         PolicyKind::Fixed,         PolicyKind::Edf,
-                                         PolicyKind::Fifo,          PolicyKind::ChainAware};
-
 /// Each take() leaves its target unchanged if the key is missing or its value is a mistake, which it reports.
 class PlanReader : protected yaml::ValueReader {
  protected:

@@ -48,7 +48,7 @@ void add_timing(CLI::App &app, lab::GenerateOptions &g) {
 void add_platform(CLI::App &app, lab::GenerateOptions &g) {
   const std::string group = "Platform";
   add_count(app, "--workers", g.workers, {1, kMaxWorkers}, "Number of workers")->group(group);
-  add_choice(app, "--preemption", g.preemption, preemption_choices(), "Preemption mode")
+  add_choice(app, "--preemption", g.preemption, choices_of<PreemptionMode>(), "Preemption mode")
       ->default_str(to_string(g.preemption))
       ->group(group);
 }

@@ -30,10 +30,10 @@ constexpr const char *kResultGroup = "Results";
 }  // namespace
 
 void add_platform_arguments(CLI::App &app, RunArguments &arguments) {
-  add_choice(app, "--policy", arguments.policy, policy_choices(), "Priority order")->group(kWorkloadGroup);
-  add_choice(app, "--ties", arguments.ties, ties_choices(), "Order of tasks with equal priority")
+  add_choice(app, "--policy", arguments.policy, choices_of<PolicyKind>(), "Priority order")->group(kWorkloadGroup);
+  add_choice(app, "--ties", arguments.ties, choices_of<Ties>(), "Order of tasks with equal priority")
       ->group(kWorkloadGroup);
-  add_choice(app, "--preemption", arguments.preemption, preemption_choices(), "Preemption mode of ReDAG-RT")
+  add_choice(app, "--preemption", arguments.preemption, choices_of<PreemptionMode>(), "Preemption mode of ReDAG-RT")
       ->group(kWorkloadGroup);
   add_count(app, "--workers", arguments.workers, {1, kMaxWorkers}, "Number of workers")
       ->default_str("")

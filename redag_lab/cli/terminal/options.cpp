@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
@@ -102,24 +101,6 @@ CLI::Option *add_seed(CLI::App &app, std::uint64_t &target, const std::string &h
 CLI::Option *add_number(CLI::App &app, const std::string &name, double &target, Range<double> range,
                         const std::string &help) {
   return add_number_to(app, name, target, range, help, "X");
-}
-
-const Choices<PolicyKind> &policy_choices() {
-  static const Choices<PolicyKind> kChoices =
-      choices_of(std::array{PolicyKind::RateMonotonic, PolicyKind::DeadlineMonotonic, PolicyKind::Fixed,
-                            PolicyKind::Edf, PolicyKind::Fifo, PolicyKind::ChainAware});
-  return kChoices;
-}
-
-const Choices<Ties> &ties_choices() {
-  static const Choices<Ties> kChoices = choices_of(std::array{Ties::Share, Ties::Fixed});
-  return kChoices;
-}
-
-const Choices<PreemptionMode> &preemption_choices() {
-  static const Choices<PreemptionMode> kChoices = choices_of(
-      std::array{PreemptionMode::None, PreemptionMode::Cooperative, PreemptionMode::Os, PreemptionMode::Auto});
-  return kChoices;
 }
 
 CLI::Option *add_pages_folder(CLI::App &app, std::string &folder) {

@@ -68,6 +68,14 @@ CLI::Option *add_seed(CLI::App &app, std::uint64_t &target, const std::string &h
 CLI::Option *add_number(CLI::App &app, const std::string &name, double &target, Range<double> range,
                         const std::string &help);
 
+/// Returns all values of an enumeration of workloads.
+template <class Value>
+Choices<Value> choices_of() {
+  Choices<Value> choices;
+  for (const Named<Value> &named : kValues<Value>) choices.emplace_back(named.name, named.value);
+  return choices;
+}
+
 /// Adds an option with a list of choices, which the help shows. `Target` is Value or std::optional<Value>.
 template <class Value, class Target>
 CLI::Option *add_choice(CLI::App &app, const std::string &name, Target &target, const Choices<Value> &choices,
@@ -89,10 +97,6 @@ CLI::Option *add_choice(CLI::App &app, const std::string &name, Target &target, 
   };
   return app.add_option_function<std::string>(name, set, help + ": " + listed)->type_name("NAME");
 }
-
-[[nodiscard]] const Choices<PolicyKind> &policy_choices();
-[[nodiscard]] const Choices<Ties> &ties_choices();
-[[nodiscard]] const Choices<PreemptionMode> &preemption_choices();
 
 /// --folder, where live pages are: live::kFolder or any folder.
 CLI::Option *add_pages_folder(CLI::App &app, std::string &folder);
