@@ -52,7 +52,7 @@ HEADER_FOLDERS = {"fmt": "fmt", "nlohmann": "nlohmann-json-dev", "tl": "libexpec
 # Peers and stacks for comparisons, which are used where they are installed, and what only these comparisons need.
 OPTIONAL = {"redag_rclcpp": {"cm_executors"},
             "redag_rclcpp_lab": {"autoware_reference_system", "cm_executors", "reference_interfaces", "reference_system",
-                                 "image_proc", "ament_index_cpp", "composition_interfaces", "rclcpp_components",
+                                 "ament_index_cpp", "composition_interfaces", "rclcpp_components",
                                  "controller_interface", "controller_manager", "controller_manager_msgs",
                                  "hardware_interface", "pluginlib", "sensor_msgs",
                                  "geometry_msgs", "nav2_controller", "nav2_msgs", "nav_msgs",

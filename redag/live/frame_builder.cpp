@@ -54,17 +54,12 @@ void set_counts(std::uint32_t (&counts)[page::kClasses], const HistogramCounts &
   }
 }
 
-void set_spread(page::Spread &spread, const HistogramCounts &all, const HistogramCounts &recent) {
-  set_counts(spread.all, all);
-  set_counts(spread.recent, recent);
-}
-
 /// Adds the answers of a sink to its DAG's row. Those of several sinks are not mixed.
 void add_answers(DagFrame &dag, const HistogramCounts &all, const HistogramCounts &recent) {
   page::Figures of_sink{};
   set_response(of_sink, all, recent);
   page::Figures &worst = dag.figures;
-  if (of_sink.response_p99 > worst.response_p99) set_spread(dag.spread, all, recent);
+  if (of_sink.response_p99 > worst.response_p99) set_counts(dag.spread.all, all);
   worst.response_p50 = std::max(worst.response_p50, of_sink.response_p50);
   worst.response_p99 = std::max(worst.response_p99, of_sink.response_p99);
   worst.response_max = std::max(worst.response_max, of_sink.response_max);
@@ -123,7 +118,7 @@ void FrameBuilder::build_tasks(const Sample &sample, bool turns, Frame &frame) {
                   .bound = task.bound,
                   .figures = figures_of(task, current, recent, history.base),
                   .priority = task.priority};
-    set_spread(row.spread, current.response, recent);
+    set_counts(row.spread.all, current.response);
     add(dag.figures, row.figures);
     if (task.end_to_end) {
       HistogramCounts recent_answers = current.end_to_end;

@@ -67,11 +67,11 @@ struct Figures {
   std::uint32_t away;     // active jobs that wait without a worker: for a device, an event, a time, a call that blocks
 };
 
-/// How often response times occurred: counts of classes of time. There are two classes an octave (see least_in()). The
-/// first class takes shorter times as well, and the last one longer times.
+/// How often response times occurred since the start: counts of classes of time. There are two classes an octave (see
+/// least_in()). The first class takes shorter times as well, and the last one longer times.
 inline constexpr std::size_t kClasses = 48;
 struct Spread {
-  std::uint32_t recent[kClasses];
+  std::uint32_t reserved[kClasses];
   std::uint32_t all[kClasses];
 };
 

@@ -146,12 +146,10 @@ TEST(FrameBuilder, ASpreadCountsClassesOfTime) {
   Frame frame;
   builder.build({{{"a", 0}}, {task_of(1, 0, 10, response)}}, kSecond / 2, frame);
   EXPECT_THAT(frame.tasks[0].spread.all, ::testing::ElementsAreArray(expected));
-  EXPECT_THAT(frame.tasks[0].spread.recent, ::testing::ElementsAreArray(expected));
   for (int second = 1; second <= 3; ++second) {
     builder.build({{{"a", 0}}, {task_of(1, 0, 10, response)}}, second * kSecond, frame);
   }
   EXPECT_THAT(frame.tasks[0].spread.all, ::testing::ElementsAreArray(expected));
-  EXPECT_THAT(frame.tasks[0].spread.recent, ::testing::Each(0U));
 }
 
 TEST(FrameBuilder, ThreadsNameTheTaskThatTheyRun) {

@@ -106,7 +106,7 @@ Frame make_frame(std::size_t dags = 2, std::size_t tasks_each = 3, std::uint64_t
     frame.dags.back().deadline = static_cast<Duration>(d) * kSecond;
     frame.dags.back().late = 9;
     frame.dags.back().recent_late = 2;
-    frame.dags.back().spread.recent[3] = 4;
+    frame.dags.back().spread.all[3] = 4;
     for (std::size_t t = 0; t < tasks_each; ++t) {
       TaskFrame task{"task" + std::to_string(t), static_cast<std::uint32_t>(d), kSecond, kSecond / 2, kSecond / 4, {}};
       task.figures.released = count;
@@ -115,7 +115,7 @@ Frame make_frame(std::size_t dags = 2, std::size_t tasks_each = 3, std::uint64_t
       task.figures.away = static_cast<std::uint32_t>(t + 1);
       task.spread.all[0] = static_cast<std::uint32_t>(count);
       task.priority = 80 - static_cast<int>(t);
-      task.spread.recent[page::kClasses - 1] = 3;
+      task.spread.all[page::kClasses - 1] = 3;
       frame.tasks.push_back(std::move(task));
     }
   }
@@ -162,7 +162,7 @@ TEST_F(LivePage, IsReadAsItWasWritten) {
   EXPECT_EQ(read.dags[1].deadline, kSecond);
   EXPECT_EQ(read.dags[1].late, 9U);
   EXPECT_EQ(read.dags[1].recent_late, 2U);
-  EXPECT_EQ(read.dags[1].spread.recent[3], 4U);
+  EXPECT_EQ(read.dags[1].spread.all[3], 4U);
   EXPECT_EQ(read.threads_in_all, 5U);
   ASSERT_THAT(read.threads, SizeIs(2));
   EXPECT_EQ(read.threads[0].used, 100);

@@ -3,7 +3,7 @@
 
 // Compares ways to run a stack of nodes. Each way is a contender, whose processes are started anew for each run. The
 // contenders take turns over several rounds. Medians of what was measured are printed as a table. Programs such as
-// bench_image_pipeline say which contenders there are and what one run does.
+// bench_nav2 say which contenders there are and what one run does.
 #pragma once
 
 #include <CLI/CLI.hpp>
