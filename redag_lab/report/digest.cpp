@@ -142,7 +142,6 @@ Group GroupReader::finish() {
     for (const RunDigest &run : group_.runs) task.add_counts(run.summary.tasks[t].jobs);
     group_.total.add_counts(task);
     task.response = responses_[t].distribution();
-    group_.responses.push_back(curve_of(responses_[t]));
   }
   for (std::size_t d = 0; d < group_.workload().dags.size(); ++d) group_.dags.push_back(pooled(DagId(d)));
   return std::move(group_);

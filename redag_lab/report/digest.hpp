@@ -17,7 +17,6 @@
 #include "redag_analysis/metrics/check/check_report.hpp"
 #include "redag_analysis/metrics/summary.hpp"
 #include "redag_lab/report/bounds.hpp"
-#include "redag_lab/report/curves.hpp"
 #include "redag_lab/report/schedule.hpp"
 #include "redag_lab/report/why.hpp"
 
@@ -42,12 +41,11 @@ struct Group {
   std::string label;
   std::vector<RunDigest> runs;
   RunBounds bounds;
-  std::size_t worst_run = 0;                       // with most misses, or without any the job closest to its deadline
-  Schedule schedule;                               // of that run
-  WhyDigest why;                                   // of that run
-  std::vector<metrics::JobStats> tasks;            // by TaskId: counts and `response`
-  std::vector<std::vector<CurvePoint>> responses;  // by TaskId
-  std::vector<Duration> executions;                // by TaskId: the longest; processor time where the runs recorded it
+  std::size_t worst_run = 0;             // with most misses, or without any the job closest to its deadline
+  Schedule schedule;                     // of that run
+  WhyDigest why;                         // of that run
+  std::vector<metrics::JobStats> tasks;  // by TaskId: counts and `response`
+  std::vector<Duration> executions;      // by TaskId: the longest; processor time where the runs recorded it
   std::vector<metrics::DagSummary> dags;
   metrics::JobCounts total;
   metrics::AssumptionCheck assumptions;  // compares bounds and wcets with measurements, for runs on threads

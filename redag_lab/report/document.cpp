@@ -151,9 +151,6 @@ Json task_row(const Group &group, const TaskRef &ref) {
   row["jobs"]["response"] = metrics::to_json(jobs.response);
   add_bound(row, group.bounds.tasks, ref.id.value,
             group.is_simulated() ? check.response.exceeded > 0 : check.response.is_alarm);
-  row["responses"] = columns(group.responses[ref.id.value], {"value_ns", "count"}, [](const CurvePoint &point) {
-    return std::vector<Json>{point.value, point.count};
-  });
   return row;
 }
 

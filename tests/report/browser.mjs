@@ -151,23 +151,14 @@ await test('phone: the page is not wider than the screen', async () => {
 await test('controls: each changes what it says', async () => {
   const {page, problems, close} = await open('comparison');
   const figure = (name) => page.locator(`figure[data-figure=${name}] .chart`);
-  const markup = (name) => drawing(page, name);
   const pixels = async () => Buffer.from(await figure('schedule').screenshot()).toString('base64');
   const changes = async (read, act, what) => {
     const before = await read();
     await act();
     assert.notEqual(await read(), before, what);
   };
-  const responses = () => markup('responses');
   const button = (name) => () => page.getByRole('button', {name, exact: true}).click();
-  await changes(responses, button('tail'), 'tail');
-  await figureShot(page, 'responses', 'tail');
-  await changes(responses, () => page.getByLabel('task', {exact: true}).selectOption('control.pid'), 'a task');
-  await figureShot(page, 'responses', 'tail-of-task');
-  await button('distribution')();
-  await figureShot(page, 'responses', 'distribution-of-task');
   await changes(() => page.locator('h2#tasks ~ div .table').first().innerText(), button('ste'), 'an executor');
-  assert.equal(await page.getByLabel('task', {exact: true}).inputValue(), 'control.pid', 'the task stays chosen');
   await changes(pixels, () => page.getByLabel('show', {exact: true}).selectOption({index: 1}), 'a view');
   await figureShot(page, 'schedule', 'worst-job');
   await changes(pixels, button('schedule: zoom out'), 'zooming');

@@ -7,7 +7,7 @@ import path from 'node:path';
 import {pathToFileURL} from 'node:url';
 import {chromium} from 'playwright-core';
 
-export const FIGURES = {comparison: ['missed', 'responses', 'schedule']};
+export const FIGURES = {comparison: ['missed', 'schedule']};
 FIGURES.experiment = ['curves'];
 FIGURES.worlds = ['curves', 'worlds'];
 FIGURES.executors = ['worlds'];

@@ -5,7 +5,7 @@
 
 const report = JSON.parse(document.getElementById('data').textContent);
 const {groups} = report;
-const state = {executor: 0, task: null, tail: false, view: 0, why: null};
+const state = {executor: 0, view: 0, why: null};
 const several = groups.length > 1;
 const isComparable = report.comparison.dags.length > 0;
 
@@ -52,33 +52,14 @@ function comparisonSection() {
   return [title, filled(() => comparisonTable(groups, report.comparison.dags))];
 }
 
-function taskChoice(refresh) {
-  return filled(() => {
-    const group = groups[state.executor];
-    const tasks = group.tasks.map((task, i) => i).filter((i) => hasCurve(group.tasks[i]));
-    const names = ['all tasks, relative to their deadlines', ...tasks.map((i) => taskName(group, i))];
-    return dropdown('task', names, 1 + tasks.indexOf(state.task), (i) => {
-      state.task = i === 0 ? null : tasks[i - 1];
-      refill();
-      refresh();
-    });
-  });
-}
-
 function detailSections() {
-  const responses = responseFigure(groups, state);
   const why = whySection(groups, state);
   const schedule = scheduleFigure(groups, state, why.show);
 
   const executors = choice('Executor', groups.map((group) => group.label), 0, (i) => {
-    const name = state.task === null ? null : taskName(groups[state.executor], state.task);
     state.executor = i;
-    // Keeps the chosen task if the other executor has it.
-    const same = name === null ? -1 : groups[i].tasks.findIndex((task, k) => taskName(groups[i], k) === name);
-    state.task = same < 0 ? null : same;
     state.view = 0;
     refill();
-    responses.draw();
     schedule.look();
     why.refill();
   });
@@ -101,10 +82,6 @@ function detailSections() {
         : `Bounds for ${bounds.assumes}. The tooltip of a bound names its method.`}${order}`);
     }),
     filled(() => taskTable(groups[state.executor])),
-    heading(2, 'responses', 'Response times'),
-    element('div.row.controls', {}, taskChoice(responses.draw),
-      choice('Curve', ['distribution', 'tail'], 0, (i) => { state.tail = i === 1; responses.draw(); })),
-    responses.box,
     ...why.nodes,
     heading(2, 'schedule', 'Schedule'),
     filled(() => {
