@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -286,7 +287,7 @@ inline constexpr std::array kValues<Device::Queue> = {Named{Device::Queue::Prior
 
 /// Returns the name of a value, or "?".
 template <class Enum>
-requires(!kValues<Enum>.empty()) [[nodiscard]] const char *to_string(Enum value) {
+requires(std::is_enum_v<Enum> && !kValues<Enum>.empty()) [[nodiscard]] const char *to_string(Enum value) {
   for (const Named<Enum> &named : kValues<Enum>) {
     if (named.value == value) return named.name;
   }
