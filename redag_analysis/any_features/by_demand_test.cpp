@@ -90,7 +90,7 @@ dags:
     tasks: [{name: write, wcet: 4ms, period: 100ms, budget: 3ms}]
 )");
   ASSERT_EQ(found.bound.tasks.size(), 4U);
-  for (int t = 0; t < 3; ++t) {
+  for (std::size_t t = 0; t < 3; ++t) {
     EXPECT_TRUE(found.bound.tasks[t].response) << t;
     EXPECT_FALSE(found.bound.tasks[t].of_ended) << t;
   }

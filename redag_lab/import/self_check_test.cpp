@@ -257,12 +257,12 @@ class Verdicts : public ::testing::Test {
     if (made) imported = *std::move(made);
   }
 
-  [[nodiscard]] Verdict verdict() const {
+  [[nodiscard]] WhatIf verdict() const {
     SelfCheck check;
     check.executor = "ste";
     for (const TaskRef &ref : flatten(imported.workload)) check.tasks.push_back({ref.id, ref.task->name, {}, {}, 0, 0});
     check.tasks.back().p50_error = slow_error;
-    const Result<Verdict> result = judge(imported, check, 2);
+    const Result<WhatIf> result = judge(imported, check, 2);
     if (result) return *result;
     ADD_FAILURE() << to_string(result.error());
     return {};
@@ -277,7 +277,7 @@ class Verdicts : public ::testing::Test {
 };
 
 TEST_F(Verdicts, SayWhatEachExecutorDoes) {
-  const Verdict result = verdict();
+  const WhatIf result = verdict();
   ASSERT_EQ(result.outcomes.size(), 6U);
   const Outcome &ste = result.outcomes[0];
   EXPECT_EQ(ste.executor, "ste");
@@ -295,11 +295,11 @@ TEST_F(Verdicts, NameChangesThatHelp) {
   for (Dag &dag : imported.workload.dags) {
     for (Task &task : dag.tasks) task.group.clear();
   }
-  const Verdict result = verdict();
+  const WhatIf result = verdict();
   EXPECT_EQ(result.outcomes[2].missed, 0U);
   EXPECT_EQ(result.outcomes[2].shown, 2U);
   std::set<std::string> words;
-  for (const Change &change : result.changes) {
+  for (const TriedChange &change : result.changes) {
     EXPECT_EQ(change.outcome.missed, 0U) << change.words;
     words.insert(change.words);
   }
@@ -309,7 +309,7 @@ TEST_F(Verdicts, NameChangesThatHelp) {
 
 TEST_F(Verdicts, AreRefusedWhereTheModelDiffers) {
   slow_error = 0.5;
-  const Verdict result = verdict();
+  const WhatIf result = verdict();
   EXPECT_EQ(result.judged(), 1U);
   EXPECT_EQ(result.refused[0], "");
   EXPECT_NE(result.refused[1], "");

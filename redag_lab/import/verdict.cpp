@@ -33,7 +33,7 @@ class Judging {
     }
   }
 
-  Result<Verdict> run(std::uint32_t other_workers) {
+  Result<WhatIf> run(std::uint32_t other_workers) {
     for (const std::uint32_t workers : {imported_.workload.platform.workers, other_workers}) {
       Workload workload = imported_.workload;
       workload.platform.workers = workers;
@@ -143,26 +143,27 @@ class Judging {
   }
 
   void keep_best_changes() {
-    std::vector<Change> &changes = verdict_.changes;
+    std::vector<TriedChange> &changes = verdict_.changes;
     const auto now = badness(verdict_.outcomes.front());
-    std::erase_if(changes, [&](const Change &change) { return badness(change.outcome) >= now; });
-    std::stable_sort(changes.begin(), changes.end(),
-                     [&](const Change &a, const Change &b) { return badness(a.outcome) < badness(b.outcome); });
+    std::erase_if(changes, [&](const TriedChange &change) { return badness(change.outcome) >= now; });
+    std::stable_sort(changes.begin(), changes.end(), [&](const TriedChange &a, const TriedChange &b) {
+      return badness(a.outcome) < badness(b.outcome);
+    });
     if (changes.size() > kMostChanges) changes.resize(kMostChanges);
   }
 
   const ImportedWorkload &imported_;
   const std::string &recorded_;
-  Verdict verdict_;
+  WhatIf verdict_;
 };
 
 }  // namespace
 
-std::size_t Verdict::judged() const {
+std::size_t WhatIf::judged() const {
   return static_cast<std::size_t>(std::count(refused.begin(), refused.end(), std::string()));
 }
 
-Result<Verdict> judge(const ImportedWorkload &imported, const SelfCheck &check, std::uint32_t other_workers) {
+Result<WhatIf> judge(const ImportedWorkload &imported, const SelfCheck &check, std::uint32_t other_workers) {
   return Judging(imported, check).run(other_workers);
 }
 

@@ -30,15 +30,15 @@ struct Outcome {
   double worst_response = 0;  // largest p99, as a share of the deadline
 };
 
-struct Change {
+struct TriedChange {
   std::string words;
   Outcome outcome;
 };
 
-struct Verdict {
+struct WhatIf {
   std::vector<std::string> refused;  // by TaskId: why there is no verdict; empty: there is one
   std::vector<Outcome> outcomes;     // the recorded executor is first, on the recorded workers, then on the others
-  std::vector<Change> changes;       // each alone, of the recorded robot; the best is first, and none makes it worse
+  std::vector<TriedChange> changes;  // each alone, of the recorded robot; the best is first, and none makes it worse
 
   [[nodiscard]] std::size_t judged() const;  // number of callbacks with a verdict
 };
@@ -48,7 +48,7 @@ inline constexpr std::size_t kMostChanges = 3;
 
 /// Simulates and analyses the executor that ran, and ReDAG-RT in modes `none` and `os`, each on the recorded number of
 /// workers and on `other_workers`; then the changes. Errors: those of run_session().
-[[nodiscard]] Result<Verdict> judge(const ImportedWorkload &imported, const SelfCheck &check,
-                                    std::uint32_t other_workers);
+[[nodiscard]] Result<WhatIf> judge(const ImportedWorkload &imported, const SelfCheck &check,
+                                   std::uint32_t other_workers);
 
 }  // namespace redag::lab

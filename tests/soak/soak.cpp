@@ -314,7 +314,8 @@ int main(int argc, char **argv) {
                           redag::PreemptionMode::Auto}) {
     modes[to_string(mode)] = mode;
   }
-  app.add_option("--preemption", arguments.preemption)->transform(CLI::CheckedTransformer(modes));
+  const auto set_mode = [&](const std::string &mode) { arguments.preemption = modes.at(mode); };
+  app.add_option_function<std::string>("--preemption", set_mode)->check(CLI::IsMember(modes));
   app.add_option("--load", arguments.load, "of each worker")->check(CLI::Range(0.01, 0.95));
   app.add_option("--churn", arguments.churn, "DAGs that come, and that go, a second")->check(CLI::Range(0.01, 1000.0));
   app.add_option("--csv", arguments.csv, "where the samples go; default: standard output");

@@ -87,7 +87,7 @@ int check_model(const lab::ImportedWorkload &imported, const ImportOptions &opti
   }
   const std::uint32_t recorded = imported.workload.platform.workers;
   const std::uint32_t other = options.workers > 0 ? options.workers : recorded == 1 ? 2 : (recorded + 1) / 2;
-  const Result<lab::Verdict> verdict = lab::judge(imported, *check, other);
+  const Result<lab::WhatIf> verdict = lab::judge(imported, *check, other);
   if (!ok(verdict, console)) return kExitBad;
   if (options.json) {
     console.print(to_text(to_json(*verdict, imported.workload)));

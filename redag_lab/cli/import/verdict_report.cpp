@@ -39,7 +39,7 @@ struct Line {
   std::vector<Figures> figures;  // by outcome
 };
 
-std::vector<Line> lines_of(const lab::Verdict &verdict, const Workload &workload) {
+std::vector<Line> lines_of(const lab::WhatIf &verdict, const Workload &workload) {
   std::vector<Line> lines;
   for (const TaskRef &ref : flatten(workload)) {
     if (!verdict.refused[ref.id.value].empty()) continue;
@@ -118,7 +118,7 @@ std::string describe(const lab::SelfCheck &check, const StreamTraits &terminal) 
   return text;
 }
 
-std::string describe(const lab::Verdict &verdict, const Workload &workload, const StreamTraits &terminal) {
+std::string describe(const lab::WhatIf &verdict, const Workload &workload, const StreamTraits &terminal) {
   const std::size_t executors = verdict.outcomes.size() / 2;
   const std::uint32_t other = verdict.outcomes[executors].workers;
   Table table({{.title = "callback", .importance = 9},
@@ -166,13 +166,13 @@ std::string describe(const lab::Verdict &verdict, const Workload &workload, cons
   if (!refused.empty()) text += "\nNo verdict, because the model does not reproduce the recording:\n" + refused;
   text += verdict.changes.empty() ? "\nNo single change that was tried makes the recorded robot better.\n"
                                   : "\nWhat would help most, each alone and checked:\n";
-  for (const lab::Change &change : verdict.changes) {
+  for (const lab::TriedChange &change : verdict.changes) {
     text += fmt::format("  {}: {}\n", change.words, figures_of(change.outcome, verdict.judged()));
   }
   return text;
 }
 
-Json to_json(const lab::Verdict &verdict, const Workload &workload) {
+Json to_json(const lab::WhatIf &verdict, const Workload &workload) {
   const auto totals = [&](const Outcome &outcome) {
     return Json{{"executor", outcome.executor}, {"workers", outcome.workers},
                 {"released", outcome.released}, {"missed", outcome.missed},
@@ -200,7 +200,7 @@ Json to_json(const lab::Verdict &verdict, const Workload &workload) {
     if (!reason.empty()) refused.push_back(Json{{"name", ref.task->name}, {"reason", reason}});
   }
   Json changes = Json::array();
-  for (const lab::Change &change : verdict.changes) {
+  for (const lab::TriedChange &change : verdict.changes) {
     Json row{{"change", change.words}};
     row.update(totals(change.outcome));
     changes.push_back(std::move(row));

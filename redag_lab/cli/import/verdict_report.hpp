@@ -16,9 +16,9 @@ namespace redag::cli {
 [[nodiscard]] std::string describe(const lab::SelfCheck &check, const StreamTraits &terminal);
 
 /// Returns a table of callbacks and chains under each executor, the callbacks without a verdict, and the changes.
-[[nodiscard]] std::string describe(const lab::Verdict &verdict, const Workload &workload, const StreamTraits &terminal);
+[[nodiscard]] std::string describe(const lab::WhatIf &verdict, const Workload &workload, const StreamTraits &terminal);
 
 /// Returns the document "redag.verdict/1" (docs/cli.md).
-[[nodiscard]] Json to_json(const lab::Verdict &verdict, const Workload &workload);
+[[nodiscard]] Json to_json(const lab::WhatIf &verdict, const Workload &workload);
 
 }  // namespace redag::cli
