@@ -180,19 +180,28 @@ bool is_shown_schedulable(const TaskSet &task_set) {
   Effort::Limits limits;
   limits.steps = kUsualEffort;
   limits.itemised.which = Itemised::Which::None;
-  std::vector<Tightest> tasks(task_set.tasks.size());
-  std::vector<Tightest> dags(task_set.dags.size());
-  for (const bool last : {false, true}) {
-    for (const Method &method : methods()) {
-      if (method.knows_all != last || (last && !lacks_bounds(task_set, tasks, dags))) continue;
-      const MethodReport report = run(task_set, method, limits);
-      if (!report.trusted) continue;
-      if (report.verdict == Verdict::Schedulable) return true;
-      keep_tightest(tasks, report.bound()->tasks, method);
-      keep_tightest(dags, report.bound()->dags, method);
-    }
+  Report report;
+  report.tasks.resize(task_set.tasks.size());
+  report.dags.resize(task_set.dags.size());
+  // True if the method shows it alone. The methods are those of analyze(), in its order.
+  const auto shows = [&](const Method &method) {
+    const MethodReport found = run(task_set, method, limits);
+    if (!found.trusted) return false;
+    keep_tightest(report.tasks, found.bound()->tasks, method);
+    keep_tightest(report.dags, found.bound()->dags, method);
+    return found.verdict == Verdict::Schedulable;
+  };
+  const auto together = [&] { return verdict(task_set, combine(report.tasks, report.dags)) == Verdict::Schedulable; };
+  const auto &all = methods();
+  if (std::any_of(all.begin(), all.end(), [&](const Method &method) { return !method.knows_all && shows(method); }))
+    return true;
+  if (together()) return true;
+  if (!lacks_bounds(task_set, report.tasks, report.dags)) return false;
+  bound_alone(task_set, all, limits, report);
+  for (const Method &method : all) {
+    if (method.knows_all && lacks_bounds(task_set, report.tasks, report.dags) && shows(method)) return true;
   }
-  return verdict(task_set, combine(tasks, dags)) == Verdict::Schedulable;
+  return together();
 }
 
 }  // namespace redag::analysis

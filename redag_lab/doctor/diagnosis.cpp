@@ -60,7 +60,8 @@ constexpr std::array kSettings = {
             "echo off | sudo tee /sys/devices/system/cpu/smt/control"},
     Setting{"isolated processors", Of::Machine, check_isolation,
             "Elsewhere other programs and the kernel's own work share processors and caches with the workers.",
-            "boot with isolcpus=2-3 nohz_full=2-3 rcu_nocbs=2-3, and give 2-3 to the workers (cpus, cpu_affinity)"},
+            "boot with isolcpus=N nohz_full=N rcu_nocbs=N, where N is the workers' processors, such as 2-3 of four, and name "
+            "them to the executor (cpus, cpu_affinity)"},
     Setting{"interrupts", Of::Machine, check_interrupts,
             "An interrupt stops the callback on its processor, however urgent.",
             "sudo systemctl stop irqbalance; echo 0 | sudo tee /proc/irq/*/smp_affinity_list"},

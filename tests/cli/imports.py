@@ -127,7 +127,7 @@ class Import(Case):
         text = robot.read_text()
         for line in ("robot: recorded", "cpus: 0-0", "  - name: robot\n", "  - name: robot_2\n", "preemption: os"):
             self.assertIn(line, text)
-        self.assertIn("robot_2/lidar", self.expect(redag("analyze", robot), 0).stdout)
+        self.assertIn("robot_2/lidar", self.expect(redag("analyze", "--all", robot), 0).stdout)
         self.expect(redag("simulate", robot, "--duration", "1s"), 0)
 
     def test_other_processes(self):
