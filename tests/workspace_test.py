@@ -145,7 +145,7 @@ class Rosdep(unittest.TestCase):
         for package in PACKAGES:
             keys, folders = keys_of(package), set()
             for file in files_of(package, ".hpp", ".cpp"):
-                if package in ROS_PACKAGES or not file.name.endswith("_test.cpp"):
+                if package in ROS_PACKAGES or not file.stem.endswith("_test"):
                     found = re.findall(r'^\s*#\s*include\s*[<"](\w+)/', file.read_text(), re.MULTILINE)
                     homes = file.parent, folder_of(package) / "src"
                     folders.update(name for name in found if not any((home / name).is_dir() for home in homes))
