@@ -60,7 +60,8 @@ constexpr std::array kSettings = {
             "echo off | sudo tee /sys/devices/system/cpu/smt/control"},
     Setting{"isolated processors", Of::Machine, check_isolation,
             "Elsewhere other programs and the kernel's own work share processors and caches with the workers.",
-            "boot with isolcpus=N nohz_full=N rcu_nocbs=N, where N is the workers' processors, such as 2-3 of four, and name "
+            "boot with isolcpus=N nohz_full=N rcu_nocbs=N, where N is the workers' processors, such as 2-3 of four, "
+            "and name "
             "them to the executor (cpus, cpu_affinity)"},
     Setting{"interrupts", Of::Machine, check_interrupts,
             "An interrupt stops the callback on its processor, however urgent.",
