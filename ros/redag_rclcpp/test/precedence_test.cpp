@@ -236,7 +236,8 @@ TEST_P(PrecedenceTest, AnAbortedPredecessorReleasesNothing) {
   send(trigger);
   ASSERT_TRUE(eventually([&] {
     const std::vector<CallbackStats> stats = executor->stats();
-    return std::any_of(stats.begin(), stats.end(), [](const CallbackStats &s) { return s.jobs.aborted == 1; });
+    return std::any_of(stats.begin(), stats.end(),
+                       [](const CallbackStats &s) { return s.task == "d.camera" && s.jobs.aborted == 1; });
   }));
   EXPECT_EQ(released("d.fusion"), 0U);
   fails = false;
