@@ -98,6 +98,7 @@ class FakeMachine {
   fs::path root_;
 };
 
+const std::string kItsFiles = std::string("proc/100/") + "root";  // as the process sees them
 const std::string kCpu2 = "sys/devices/system/cpu/cpu2/";
 const std::string kCpu3 = "sys/devices/system/cpu/cpu3/";
 const std::string kIdle = "cpuidle/state1/";
@@ -317,7 +318,7 @@ TEST(Attach, SimulatedTimeIsSeenOnTheCommandLineAndInFiles) {
   EXPECT_EQ(machine->find("simulated time", 100).found, "no such line") << "no ROS program";
   machine->write("proc/100/cmdline", std::string("robot\0--ros-args\0--params-file\0/p.yaml\0", 39));
   EXPECT_EQ(machine->find("simulated time", 100).verdict, Verdict::Unknown) << "a node may set it";
-  machine->write("proc/100/root/p.yaml", "/**:\n  ros__parameters:\n    use_sim_time: true\n");
+  machine->write(kItsFiles + "/p.yaml", "/**:\n  ros__parameters:\n    use_sim_time: true\n");
   EXPECT_EQ(machine->find("simulated time", 100).verdict, Verdict::Yellow);
   machine->write("proc/100/cmdline", std::string("robot\0--ros-args\0-p\0use_sim_time:=true\0", 39));
   EXPECT_EQ(machine->find("simulated time", 100).verdict, Verdict::Yellow);
@@ -350,7 +351,7 @@ TEST(Attach, ItsLivePageSpeaks) {
   machine->write_process("100", "pid:[2]");
   EXPECT_EQ(machine->find("live page", 100).verdict, Verdict::Unknown);
   machine->write("proc/100/status", fmt::format("NSpid:\t100\t{}\n", ::getpid()));
-  const fs::path folder = machine->path("proc/100/root/dev/shm");
+  const fs::path folder = machine->path(kItsFiles + "/dev/shm");
   fs::create_directories(folder);
   const auto writer = live::PageWriter::create(folder.string());
   ASSERT_TRUE(writer);

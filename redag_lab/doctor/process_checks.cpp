@@ -4,17 +4,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <set>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "redag/base/text.hpp"
 #include "redag/base/words.hpp"
+#include "redag/live/middleware_names.hpp"
 #include "redag/live/owned_file.hpp"
 #include "redag/live/reader.hpp"
 #include "redag/threads/setup.hpp"
@@ -44,17 +43,6 @@ std::int64_t allowed_priority(const Subject &subject, const Process &process) {
   const std::int64_t limit = limit_of(subject.machine, process, "Max realtime priority");
   if (limit >= runtime::kHighestPriority) return std::min<std::int64_t>(limit, 99);
   return has_capability(subject.machine, process, kNice) ? 99 : limit;
-}
-
-// Recognises the names of threads of Cyclone DDS and of Fast DDS that deliver messages (middleware_threads.hpp in
-// ros/redag_rclcpp has the sources). Others only free memory or write logs.
-bool delivers_messages(std::string_view name) {
-  constexpr std::array<std::string_view, 11> kBegins{"recv",      "dq.builtins", "dq.user",  "tev",
-                                                     "dds.udp.",  "dds.tcp",     "dds.shm.", "dds.ev.",
-                                                     "dds.dsha.", "dds.ds_ev.",  "dds.asyn."};
-  return name != "dds.shm.wdog" && std::any_of(kBegins.begin(), kBegins.end(), [&](std::string_view begin) {
-           return name.substr(0, begin.size()) == begin;
-         });
 }
 
 // The pool of an executor has names such as "redag-3".
@@ -109,7 +97,9 @@ std::vector<int> Subject::cpus() const {
 
 bool Subject::is_ros() const {
   const std::vector<Thread> all = threads();
-  if (std::any_of(all.begin(), all.end(), [](const Thread &each) { return delivers_messages(each.name); })) return true;
+  if (std::any_of(all.begin(), all.end(),
+                  [](const Thread &each) { return live::is_middleware_thread_name(each.name); }))
+    return true;
   return std::any_of(processes.begin(), processes.end(), [&](const Process &process) {
     const std::vector<std::string> arguments = arguments_of(*this, process);
     return std::find(arguments.begin(), arguments.end(), kRosArguments) != arguments.end();
@@ -150,7 +140,7 @@ Finding check_middleware(const Subject &subject) {
   }
   std::vector<Finding> delivering;
   for (const Thread &thread : threads) {
-    if (!delivers_messages(thread.name)) continue;
+    if (!live::is_middleware_thread_name(thread.name)) continue;
     const bool waits = most_urgent > 0 && thread.priority <= most_urgent;
     delivering.push_back(
         {waits ? Verdict::Red : Verdict::Green,

@@ -17,6 +17,7 @@
 
 #include "mode_test.hpp"
 #include "rcl/context.h"
+#include "redag/live/middleware_names.hpp"
 #include "redag/threads/threads.hpp"
 #include "spinning.hpp"
 #include "test_msgs/msg/basic_types.hpp"
@@ -70,8 +71,9 @@ class ConfiguredMiddleware : public ModeTest {
     const std::vector<MiddlewareThread> threads = threads_that_deliver();
     ASSERT_THAT(threads, Not(IsEmpty())) << name_;
     if (name_.rfind("rmw_fastrtps", 0) == 0 &&
-        std::none_of(threads.begin(), threads.end(),
-                     [](const MiddlewareThread &thread) { return is_middleware_thread_name(thread.name); })) {
+        std::none_of(threads.begin(), threads.end(), [](const MiddlewareThread &thread) {
+          return redag::live::is_middleware_thread_name(thread.name);
+        })) {
       GTEST_SKIP() << "this Fast DDS has no configuration of threads";
     }
     if (name_.rfind("rmw_fastrtps", 0) != 0 && name_ != "rmw_cyclonedds_cpp") {

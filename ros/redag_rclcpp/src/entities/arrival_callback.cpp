@@ -65,7 +65,7 @@ void ArrivalCallback::arrived(std::size_t count, Source source, int part, bool s
     if (learn_from_arrival(now, count, source, publisher)) to_adopt = context();
     const Time origin = origin_of(now, publisher);
     const bool direct = context()->direct();
-    if (source == Source::IntraProcess) in_process_ = true;
+    if (joined_) came_[index_of(source)].store(true, std::memory_order_relaxed);
     if (depth_ > 0) count = std::min(count, depth_);
     bool replaces = false;
     for (std::size_t i = 0; i < count; ++i) {
@@ -278,8 +278,10 @@ bool ArrivalCallback::run_newest(Time release) {
   do {
     if (!take_newest(release, std::exchange(or_later, false), token)) return false;
   } while (!execute_token(token));
-  const redag::LockGuard guard(lock_);
-  while (!tokens_.empty() && tokens_.front().arrival < token.arrival) pass_over(0);  // of the other source
+  if (came_[0] && came_[1]) {  // older messages of the other source are copies, or too old
+    const redag::LockGuard guard(lock_);
+    while (!tokens_.empty() && tokens_.front().arrival < token.arrival) pass_over(0);
+  }
   return true;
 }
 
@@ -339,7 +341,7 @@ std::optional<Time> ArrivalCallback::waits_since() const {
   const redag::LockGuard guard(lock_);
   for (std::size_t i = 0; joined_ && i < tokens_.size(); ++i) {
     const Token &token = tokens_.at(i);
-    if (token.source == Source::IntraProcess || !in_process_) return token.arrival;
+    if (token.source == Source::IntraProcess || !came_[index_of(Source::IntraProcess)]) return token.arrival;
   }
   return std::nullopt;
 }

@@ -184,11 +184,11 @@ class ArrivalCallback : public Callback, public Hooked {
   std::size_t dropped_[2] REDAG_GUARDED_BY(lock_) = {0, 0};   // part of kept_: their jobs were skipped; without token
   std::size_t dropping_[2] REDAG_GUARDED_BY(lock_) = {0, 0};  // part of kept_: to be dropped by the next job
   std::atomic<bool> leftovers_[2] = {false, false};           // there may be more messages than tokens
+  std::atomic<bool> came_[2] = {false, false};                // messages have come; if from both, some are copies
   // Jobs in the scheduler, or whose skip it has yet to report. hold_releases() counts as one.
   std::uint32_t released_ REDAG_GUARDED_BY(lock_) = 0;
-  bool noted_ REDAG_GUARDED_BY(lock_) = false;       // noted by note(), not yet admitted
-  bool seen_ REDAG_GUARDED_BY(lock_) = false;        // seen by the wait set, not yet handled
-  bool in_process_ REDAG_GUARDED_BY(lock_) = false;  // a message has come from this process: others may be its copies
+  bool noted_ REDAG_GUARDED_BY(lock_) = false;  // noted by note(), not yet admitted
+  bool seen_ REDAG_GUARDED_BY(lock_) = false;   // seen by the wait set, not yet handled
   std::vector<TaskId> publishers_ REDAG_GUARDED_BY(lock_);
   std::uint64_t arrivals_[2] REDAG_GUARDED_BY(lock_) = {0, 0};
   // Messages from the middleware, counted if intra-process communication delivers messages as well.

@@ -19,47 +19,17 @@
 
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/mutex.hpp"
+#include "redag/live/middleware_names.hpp"
 #include "watch/start_routines.hpp"
 
 namespace redag_rclcpp {
 namespace {
 
 namespace fs = std::filesystem;
+namespace live = redag::live;
 
 // libfastdds is Fast DDS 3.
 constexpr std::array<std::string_view, 4> kLibraries{"libddsc.so", "libfastrtps.so", "libfastdds.so", "libzenohc.so"};
-
-// Threads of these libraries that neither receive nor deliver: they free memory, write logs, or look after files. A
-// name that ends with a dot is followed by more. Cyclone DDS: q_gc.c, q_debmon.c, dds_init.c. Fast DDS: Log.cpp,
-// LogTopic.cpp, SharedMemLog.hpp, SharedMemWatchdog.hpp, TypeLookupRequestListener.cpp, FileWatch.hpp.
-constexpr std::array<std::string_view, 10> kBackground{"gc",         "debmon",       "threadmon",    "dds.log",
-                                                       "dds.slog.",  "dds.shmd.",    "dds.shm.wdog", "dds.tls.",
-                                                       "dds.fwatch", "dds.fwatch.cb"};
-
-// Names in Cyclone DDS: q_init.c, q_radmin.c, q_xevent.c. dq.* deliver what recv* received; tev sends acknowledgements.
-constexpr std::array<std::string_view, 6> kCyclone{"recv", "recvMC", "recvUC", "dq.builtins", "dq.user", "tev"};
-// Names in Fast DDS: UDPChannelResource.cpp, TCPTransportInterface.cpp, SharedMemChannelResource.hpp,
-// DataSharingListener.cpp, RTPSParticipantImpl.cpp, PDPServer.cpp, FlowControllerImpl.hpp. Numbers follow, separated by
-// dots.
-constexpr std::array<std::string_view, 7> kFastNumbered{"dds.udp.", "dds.tcp.",   "dds.shm.", "dds.dsha.",
-                                                        "dds.ev.",  "dds.ds_ev.", "dds.asyn."};
-constexpr std::array<std::string_view, 2> kFastWhole{"dds.tcp_accept", "dds.tcp_keep"};
-
-bool is_cyclone(std::string_view name) { return std::find(kCyclone.begin(), kCyclone.end(), name) != kCyclone.end(); }
-
-bool is_fast(std::string_view name) {
-  if (std::find(kFastWhole.begin(), kFastWhole.end(), name) != kFastWhole.end()) return true;
-  return std::any_of(kFastNumbered.begin(), kFastNumbered.end(), [&](std::string_view prefix) {
-    const bool begins = name.size() > prefix.size() && name.substr(0, prefix.size()) == prefix;
-    return begins && name.find_first_not_of("0123456789.", prefix.size()) == std::string_view::npos;
-  });
-}
-
-bool works_in_background(std::string_view name) {
-  return std::any_of(kBackground.begin(), kBackground.end(), [&](std::string_view known) {
-    return known.back() == '.' ? name.substr(0, known.size()) == known : name == known;
-  });
-}
 
 /// Located once, because the place is the same for all threads of a process. Tried again after an error: there may have
 /// been too few threads for it.
@@ -149,15 +119,14 @@ bool is_middleware_library(std::string_view path) {
                      [&](std::string_view library) { return name.substr(0, library.size()) == library; });
 }
 
-bool is_middleware_thread_name(std::string_view name) { return is_cyclone(name) || is_fast(name); }
-
 MiddlewareThreads find_middleware_threads() {
   MiddlewareThreads found;
   const redag::Result<StartRoutines> routines = start_routines();
   if (!routines) found.by_names_because = routines.error().front().message;
   const auto is_middleware = [&](const MiddlewareThread &thread) {
     if (routines) return is_middleware_library(routines->library_of(thread.id));
-    return is_fast(thread.name) || (is_cyclone(thread.name) && blocks_signals(thread.id));
+    return live::is_middleware_thread_name(thread.name) &&
+           (!live::is_cyclone_thread_name(thread.name) || blocks_signals(thread.id));
   };
   std::error_code error;
   for (const auto &entry : fs::directory_iterator("/proc/self/task", error)) {
@@ -166,7 +135,7 @@ MiddlewareThreads find_middleware_threads() {
     if (std::from_chars(id.data(), id.data() + id.size(), thread.id).ec != std::errc()) continue;
     std::ifstream file(entry.path() / "comm");
     if (!std::getline(file, thread.name) || !is_middleware(thread)) continue;
-    thread.delivers = !works_in_background(thread.name);
+    thread.delivers = !live::works_in_background(thread.name);
     Scheduling now;
     if (read_scheduling(thread.id, now) && now.is_realtime()) thread.priority = now.parameters.sched_priority;
     found.threads.push_back(std::move(thread));

@@ -29,11 +29,6 @@ struct MiddlewareThreads {
 /// True for the file of a library that starts the threads of Cyclone DDS, Fast DDS, or Zenoh: "/opt/lib/libddsc.so.0".
 [[nodiscard]] bool is_middleware_library(std::string_view path);
 
-/// True if threads that receive or deliver data have this name. Cyclone DDS: recv, recvMC, recvUC, dq.builtins,
-/// dq.user, tev. Fast DDS since 2.11: dds.udp.7400, dds.tcp.1, dds.tcp_accept, dds.tcp_keep, dds.shm.7400, dds.dsha.1,
-/// dds.ev.1, dds.ds_ev.1, dds.asyn.1.1.
-[[nodiscard]] bool is_middleware_thread_name(std::string_view name);
-
 /// Threads that such a library started. Where the system does not tell, threads with such a name; Cyclone DDS blocks
 /// all signals in its threads, which tells them from users' threads of the same name.
 [[nodiscard]] MiddlewareThreads find_middleware_threads();
