@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <map>
 #include <set>
 #include <string>
@@ -257,12 +258,15 @@ class Verdicts : public ::testing::Test {
     if (made) imported = *std::move(made);
   }
 
-  [[nodiscard]] WhatIf verdict() const {
+  [[nodiscard]] SelfCheck check() const {
     SelfCheck check;
     check.executor = "ste";
     for (const TaskRef &ref : flatten(imported.workload)) check.tasks.push_back({ref.id, ref.task->name, {}, {}, 0, 0});
     check.tasks.back().p50_error = slow_error;
-    const Result<WhatIf> result = judge(imported, check, 2);
+    return check;
+  }
+  [[nodiscard]] WhatIf verdict() const {
+    const Result<WhatIf> result = judge(imported, check(), {.other_workers = 2});
     if (result) return *result;
     ADD_FAILURE() << to_string(result.error());
     return {};
@@ -289,6 +293,20 @@ TEST_F(Verdicts, SayWhatEachExecutorDoes) {
   EXPECT_EQ(os.workers, 1U);
   EXPECT_GT(os.missed, 30U) << "the callbacks share a group, which preemption does not open";
   EXPECT_EQ(result.outcomes[5].workers, 2U);
+}
+
+TEST_F(Verdicts, AStopEndsThem) {
+  std::atomic<bool> stop{false};
+  double last = -1;
+  const auto progress = [&](double done) {
+    EXPECT_GT(done, last);
+    EXPECT_LT(done, 1);
+    last = done;
+    stop = done > 0.1;
+  };
+  const Result<WhatIf> result = judge(imported, check(), {.other_workers = 2, .stop = &stop, .progress = progress});
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().front().message, "interrupted: there is no verdict");
 }
 
 TEST_F(Verdicts, NameChangesThatHelp) {

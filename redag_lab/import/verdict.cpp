@@ -21,7 +21,8 @@ constexpr std::size_t kMostTried = 8;  // groups and rates: each is a simulation
 
 class Judging {
  public:
-  Judging(const ImportedWorkload &imported, const SelfCheck &check) : imported_(imported), recorded_(check.executor) {
+  Judging(const ImportedWorkload &imported, const SelfCheck &check, JudgeOptions options)
+      : imported_(imported), recorded_(check.executor), options_(std::move(options)) {
     verdict_.refused.assign(imported.workload.task_count(), "the recording does not say when its jobs were released");
     for (const ReproducedTask &task : check.tasks) {
       verdict_.refused[task.task.value] =
@@ -33,8 +34,8 @@ class Judging {
     }
   }
 
-  Result<WhatIf> run(std::uint32_t other_workers) {
-    for (const std::uint32_t workers : {imported_.workload.platform.workers, other_workers}) {
+  Result<WhatIf> run() {
+    for (const std::uint32_t workers : {imported_.workload.platform.workers, options_.other_workers}) {
       Workload workload = imported_.workload;
       workload.platform.workers = workers;
       for (const std::string &executor : {like_recorded(workers), std::string("redag-none"), std::string("redag-os")}) {
@@ -51,12 +52,18 @@ class Judging {
   }
 
  private:
-  Result<Outcome> outcome_of(const Workload &workload, const std::string &executor) const {
+  Result<Outcome> outcome_of(const Workload &workload, const std::string &executor) {
+    constexpr double kMostSimulations = 7 + 2 * kMostTried;
+    if (options_.progress) options_.progress(static_cast<double>(simulations_++) / kMostSimulations);
     const Result<Variant> variant = parse_variant(executor);
     if (!variant) return tl::unexpected(variant.error());
     Replayed replayed = replay(imported_, workload);
+    replayed.options.stop = options_.stop;
     Result<Session> session = run_session(replayed.workload, *variant, replayed.options);
     if (!session) return tl::unexpected(std::move(session.error()));
+    if (options_.stop != nullptr && options_.stop->load()) {
+      return make_error("interrupted: there is no verdict", "record for less time, or leave out --verdict");
+    }
     Outcome outcome{.executor = executor,
                     .workers = workload.platform.workers,
                     .summary = std::move(session->summary),
@@ -154,6 +161,8 @@ class Judging {
 
   const ImportedWorkload &imported_;
   const std::string &recorded_;
+  const JudgeOptions options_;
+  int simulations_ = 0;
   WhatIf verdict_;
 };
 
@@ -163,8 +172,8 @@ std::size_t WhatIf::judged() const {
   return static_cast<std::size_t>(std::count(refused.begin(), refused.end(), std::string()));
 }
 
-Result<WhatIf> judge(const ImportedWorkload &imported, const SelfCheck &check, std::uint32_t other_workers) {
-  return Judging(imported, check).run(other_workers);
+Result<WhatIf> judge(const ImportedWorkload &imported, const SelfCheck &check, JudgeOptions options) {
+  return Judging(imported, check, std::move(options)).run();
 }
 
 }  // namespace redag::lab

@@ -5,7 +5,9 @@
 // Callbacks that the self-check does not reproduce get no verdict. Prints nothing.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -46,9 +48,14 @@ struct WhatIf {
 /// The most changes that are named.
 inline constexpr std::size_t kMostChanges = 3;
 
+struct JudgeOptions {
+  std::uint32_t other_workers = 1;
+  const std::atomic<bool> *stop = nullptr;              // ends it, with an error
+  std::function<void(double done)> progress = nullptr;  // before each simulation: 0 to 1
+};
+
 /// Simulates and analyses the executor that ran, and ReDAG-RT in modes `none` and `os`, each on the recorded number of
-/// workers and on `other_workers`; then the changes. Errors: those of run_session().
-[[nodiscard]] Result<WhatIf> judge(const ImportedWorkload &imported, const SelfCheck &check,
-                                   std::uint32_t other_workers);
+/// workers and on the other one; then the changes. Errors: those of run_session(), and the stop.
+[[nodiscard]] Result<WhatIf> judge(const ImportedWorkload &imported, const SelfCheck &check, JudgeOptions options);
 
 }  // namespace redag::lab

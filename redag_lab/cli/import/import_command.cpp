@@ -22,6 +22,7 @@
 #include "redag_lab/import/ctf_reader.hpp"
 #include "redag_lab/import/model.hpp"
 #include "redag_lab/import/self_check.hpp"
+#include "redag_lab/import/verdict.hpp"
 
 namespace redag::cli {
 namespace {
@@ -76,6 +77,17 @@ std::vector<std::string> gaps_of(const lab::ReadTrace &read) {
   return gaps;
 }
 
+Result<lab::WhatIf> judge(const lab::ImportedWorkload &imported, const lab::SelfCheck &check,
+                          std::uint32_t other_workers, Console &console) {
+  const InterruptGuard guard;
+  Progress progress(console);
+  progress.set_label("judging");
+  return lab::judge(imported, check,
+                    {.other_workers = other_workers, .stop = &InterruptGuard::flag(), .progress = [&](double done) {
+                       if (progress.due()) progress.draw(done, "simulating" + progress.left(done));
+                     }});
+}
+
 // Prints whether the simulator does what the robot did, and with `verdict` what other executors would do. Returns the
 // exit status.
 int check_model(const lab::ImportedWorkload &imported, const ImportOptions &options, Console &console) {
@@ -87,7 +99,7 @@ int check_model(const lab::ImportedWorkload &imported, const ImportOptions &opti
   }
   const std::uint32_t recorded = imported.workload.platform.workers;
   const std::uint32_t other = options.workers > 0 ? options.workers : recorded == 1 ? 2 : (recorded + 1) / 2;
-  const Result<lab::WhatIf> verdict = lab::judge(imported, *check, other);
+  const Result<lab::WhatIf> verdict = judge(imported, *check, other, console);
   if (!ok(verdict, console)) return kExitBad;
   if (options.json) {
     console.print(to_text(to_json(*verdict, imported.workload)));
