@@ -95,10 +95,14 @@ Bound combine(const std::vector<Tightest> &tasks, const std::vector<Tightest> &d
   return bound;
 }
 
-// The report points into `methods`. `always`: a method that knows all features runs, too, where others leave nothing to
-// it.
+struct HowFar {
+  bool always = false;       // a method that knows all features runs, too, where others leave nothing to it
+  bool until_shown = false;  // ends with the first methods that show all deadlines to be met
+};
+
+// The report points into `methods`.
 Report report_of(const TaskSet &task_set, const std::vector<Method> &methods, const AnalyzeOptions &options,
-                 bool always) {
+                 HowFar how_far) {
   Report report;
   report.tasks.resize(task_set.tasks.size());
   report.dags.resize(task_set.dags.size());
@@ -118,9 +122,16 @@ Report report_of(const TaskSet &task_set, const std::vector<Method> &methods, co
     if (found.bound()->accepts == true) report.by.push_back(&method);
     return found;
   };
+  const auto are_met = [&] { return verdict(task_set, combine(report.tasks, report.dags)) == Verdict::Schedulable; };
   for (const Method &method : methods) {
     MethodReport later{&method, NotApplicable{"other methods bound all tasks"}};
     report.methods.push_back(method.knows_all ? std::move(later) : apply(method, report.methods.size()));
+    report.verdict = report.methods.back().trusted ? report.methods.back().verdict : Verdict::NotShown;
+    if (how_far.until_shown && report.verdict == Verdict::Schedulable) return report;
+  }
+  if (how_far.until_shown && are_met()) {
+    report.verdict = Verdict::Schedulable;
+    return report;
   }
 
   Effort::Limits limits;
@@ -129,10 +140,10 @@ Report report_of(const TaskSet &task_set, const std::vector<Method> &methods, co
   bound_alone(task_set, methods, limits, report);
   for (std::size_t i = 0; i < methods.size(); ++i) {
     if (!methods[i].knows_all) continue;
-    if (always || lacks_bounds(task_set, report.tasks, report.dags)) report.methods[i] = apply(methods[i], i);
+    if (how_far.always || lacks_bounds(task_set, report.tasks, report.dags)) report.methods[i] = apply(methods[i], i);
   }
 
-  if (verdict(task_set, combine(report.tasks, report.dags)) == Verdict::Schedulable) {
+  if (are_met()) {
     for (const Tightest &best : report.tasks) {
       if (best.method != nullptr && std::find(report.by.begin(), report.by.end(), best.method) == report.by.end()) {
         report.by.push_back(best.method);
@@ -146,12 +157,12 @@ Report report_of(const TaskSet &task_set, const std::vector<Method> &methods, co
 }  // namespace
 
 Report analyze(const TaskSet &task_set, const AnalyzeOptions &options) {
-  return report_of(task_set, methods(), options, false);
+  return report_of(task_set, methods(), options, {});
 }
 
 Report analyze(const TaskSet &task_set, std::vector<Method> methods, const AnalyzeOptions &options) {
   const auto owned = std::make_shared<const std::vector<Method>>(std::move(methods));
-  Report report = report_of(task_set, *owned, options, true);
+  Report report = report_of(task_set, *owned, options, {.always = true});
   report.owned = owned;
   return report;
 }
@@ -177,31 +188,7 @@ ResponseBound itemised(const TaskSet &task_set, const Tightest &tightest, DagId 
 Bound tightest_of(const Report &report) { return combine(report.tasks, report.dags); }
 
 bool is_shown_schedulable(const TaskSet &task_set) {
-  Effort::Limits limits;
-  limits.steps = kUsualEffort;
-  limits.itemised.which = Itemised::Which::None;
-  Report report;
-  report.tasks.resize(task_set.tasks.size());
-  report.dags.resize(task_set.dags.size());
-  // True if the method shows it alone. The methods are those of analyze(), in its order.
-  const auto shows = [&](const Method &method) {
-    const MethodReport found = run(task_set, method, limits);
-    if (!found.trusted) return false;
-    keep_tightest(report.tasks, found.bound()->tasks, method);
-    keep_tightest(report.dags, found.bound()->dags, method);
-    return found.verdict == Verdict::Schedulable;
-  };
-  const auto together = [&] { return verdict(task_set, combine(report.tasks, report.dags)) == Verdict::Schedulable; };
-  const auto &all = methods();
-  if (std::any_of(all.begin(), all.end(), [&](const Method &method) { return !method.knows_all && shows(method); }))
-    return true;
-  if (together()) return true;
-  if (!lacks_bounds(task_set, report.tasks, report.dags)) return false;
-  bound_alone(task_set, all, limits, report);
-  for (const Method &method : all) {
-    if (method.knows_all && lacks_bounds(task_set, report.tasks, report.dags) && shows(method)) return true;
-  }
-  return together();
+  return report_of(task_set, methods(), {}, {.until_shown = true}).verdict == Verdict::Schedulable;
 }
 
 }  // namespace redag::analysis
