@@ -221,21 +221,11 @@ std::vector<Duration> bounds_of(const Workload &workload, const Variant &variant
 Result<Session> run_on_threads(const Workload &workload, const Variant &variant, const SessionOptions &options,
                                const ProgressHook &progress) {
   RunOptions run;
-  run.duration = options.duration;
-  run.warm_up = options.warm_up;
-  run.seed = options.seed;
+  static_cast<RunSettings &>(run) = options;
   run.executor = variant.executor;
   run.preemption = workload.platform.preemption;
-  run.realtime_threads = options.realtime_threads || variant.realtime_threads;
-  run.lock_memory = options.lock_memory;
-  run.spin = options.spin;
-  run.cpus = options.cpus;
-  run.stop = options.stop;
-  run.live = options.live;
-  run.record = options.record;
-  run.record_bytes = options.record_bytes;
+  run.realtime_threads |= variant.realtime_threads;
   if (options.watchdog > 0) run.watchdog = runtime::WatchdogOptions{{options.watchdog, 0}, 10 * kMillisecond};
-  run.on_overdue = options.on_overdue;
   run.bounds = [&](const sched::Config &config) { return bounds_of(workload, variant, config); };
   run.scheduler = [&](const Workload &w, const sched::Config &config) {
     return executors::make_scheduler(variant.executor, w, config);

@@ -5,7 +5,6 @@
 // summary and a verdict of the trace checker. Prints nothing. Blocks until the run is over; one session at a time.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -16,12 +15,12 @@
 #include "redag/base/result.hpp"
 #include "redag/loader/calibration.hpp"
 #include "redag/model/workload.hpp"
-#include "redag/trace/events_file.hpp"
 #include "redag/trace/trace.hpp"
 #include "redag_analysis/metrics/check/check_report.hpp"
 #include "redag_analysis/metrics/files/run_files.hpp"
 #include "redag_analysis/metrics/summary.hpp"
 #include "redag_analysis/sim/simulator.hpp"
+#include "redag_lab/run/run_workload.hpp"
 #include "redag_lab/run/variant.hpp"
 
 namespace redag::lab {
@@ -30,29 +29,17 @@ namespace redag::lab {
 /// and written after their end, because the work would disturb them.
 inline constexpr std::uint64_t kMostKeptEvents = std::uint64_t{1} << 22U;
 
-struct SessionOptions {
+struct SessionOptions : RunSettings {
   trace::Driver driver = trace::Driver::Simulator;
-  Duration duration = 10 * kSecond;
-  Duration warm_up = 0;
-  std::uint64_t seed = 1;
   /// Number of events that are checked and written, up to the end of an instant. Later events only enter the summary.
   std::uint64_t max_events = kMostKeptEvents;
-  metrics::FilesOptions files;              // written while the run goes on, and completed by write_session()
-  bool keep_trace = true;                   // false: Session::trace has no events
-  const std::atomic<bool> *stop = nullptr;  // ends the run early, with the results so far
-  sim::Overheads overheads;                 // simulator, like `demand` and `gap`
+  metrics::FilesOptions files;  // written while the run goes on, and completed by write_session()
+  bool keep_trace = true;       // false: Session::trace has no events
+  sim::Overheads overheads;     // simulator, like `demand` and `gap`
   decltype(sim::Options::demand) demand;
   decltype(sim::Options::gap) gap;
   std::optional<Calibration> calibration;  // overheads of a machine: simulated; on threads, charged to bounds
-  std::vector<int> cpus;                   // threads only, like the members below
-  bool lock_memory = false;
-  bool realtime_threads = false;
-  Duration spin = 0;
-  bool live = false;   // publishes a live page for `redag top`
-  std::string record;  // file for a record of the run that outlives the process; empty: none
-  std::uint64_t record_bytes = trace::kMostRecordBytes;
-  Duration watchdog = 0;  // reports jobs that run for longer to `on_overdue` at once; 0: off
-  std::function<void(const std::string &text)> on_overdue;
+  Duration watchdog = 0;                   // threads: reports jobs that run for longer to `on_overdue` at once; 0: off
 };
 
 /// Called repeatedly while a session runs, with the time and, by DAG, the number of jobs so far that were late or lost.
