@@ -46,7 +46,11 @@ class Judging {
     }
     verdict_.changes = {{"ReDAG-RT with preemption none", verdict_.outcomes[1]},
                         {"ReDAG-RT with preemption os", verdict_.outcomes[2]}};
-    if (const Result<void> tried = try_changes(); !tried) return tl::unexpected(tried.error());
+    for (Change &change : possible_changes()) {
+      Result<Outcome> outcome = outcome_of(change.robot, like_recorded(change.robot.platform.workers));
+      if (!outcome) return tl::unexpected(std::move(outcome.error()));
+      verdict_.changes.push_back({std::move(change.words), *std::move(outcome)});
+    }
     keep_best_changes();
     return std::move(verdict_);
   }
@@ -97,20 +101,16 @@ class Judging {
   // An executor of one thread becomes another one with more of them.
   [[nodiscard]] std::string like_recorded(std::uint32_t workers) const { return workers > 1 ? "mte" : recorded_; }
 
-  Result<void> try_change(std::string words, const Workload &changed) {
-    Result<Outcome> outcome = outcome_of(changed, like_recorded(changed.platform.workers));
-    if (!outcome) return tl::unexpected(std::move(outcome.error()));
-    verdict_.changes.push_back({std::move(words), *std::move(outcome)});
-    return {};
-  }
+  struct Change {
+    std::string words;
+    Workload robot;
+  };
 
-  Result<void> try_changes() {
+  [[nodiscard]] std::vector<Change> possible_changes() const {
     Workload more = imported_.workload;
     const std::uint32_t workers = more.platform.workers++;
-    if (const Result<void> tried = try_change(fmt::format("{} threads instead of {}", workers + 1, workers), more);
-        !tried) {
-      return tried;
-    }
+    std::vector<Change> changes{{fmt::format("{} threads instead of {}", workers + 1, workers), more}};
+
     // Tasks by how much they take of a processor.
     std::vector<TaskRef> refs = flatten(imported_.workload);
     const auto share = [](const TaskRef &ref) {
@@ -120,24 +120,20 @@ class Judging {
     std::size_t groups = 0;
     std::size_t rates = 0;
     for (const TaskRef &ref : refs) {
-      if (!ref.task->group.empty() && groups++ < kMostTried) {
-        Workload changed = imported_.workload;
-        task_of(changed, ref).group.clear();
-        const Result<void> tried = try_change(ref.task->name + " in a callback group of its own", changed);
-        if (!tried) return tried;
+      const Task &task = *ref.task;
+      if (!task.group.empty() && groups++ < kMostTried) {
+        changes.push_back({task.name + " in a callback group of its own", imported_.workload});
+        task_of(changes.back().robot, ref).group.clear();
       }
-      if (ref.task->activation != Activation::Data && rates++ < kMostTried) {
-        Workload changed = imported_.workload;
-        task_of(changed, ref).period *= 2;
-        inherit_periods(changed.dags[ref.dag.value]);
-        const Result<void> tried =
-            try_change(fmt::format("{} every {} instead of {}", ref.task->name, humanize_duration(2 * ref.task->period),
-                                   humanize_duration(ref.task->period)),
-                       changed);
-        if (!tried) return tried;
+      if (task.activation != Activation::Data && rates++ < kMostTried) {
+        const auto words = fmt::format("{} every {} instead of {}", task.name, humanize_duration(2 * task.period),
+                                       humanize_duration(task.period));
+        changes.push_back({words, imported_.workload});
+        task_of(changes.back().robot, ref).period *= 2;
+        inherit_periods(changes.back().robot.dags[ref.dag.value]);
       }
     }
-    return {};
+    return changes;
   }
 
   static Task &task_of(Workload &workload, const TaskRef &ref) { return workload.dags[ref.dag.value].tasks[ref.index]; }
