@@ -340,5 +340,46 @@ dags:
   EXPECT_EQ(workload.dags[1].name, "control") << "as its file has it";
 }
 
+// ---- the lines at the end ----
+
+TaskFigures late_one(const std::string &name, redag::Duration period, std::uint64_t misses) {
+  TaskFigures task{.stats = stats_of(name, period), .bound = {}, .has_deadline = true};
+  task.stats.jobs.released = 100;
+  task.stats.misses = misses;
+  return task;
+}
+
+TEST(ClosingLines, NameTheWorstCallbackItsLikelyCauseAndWhatHelps) {
+  Snapshot snapshot;
+  snapshot.workers = 1;
+  snapshot.mode.mode = redag::PreemptionMode::None;
+  snapshot.tasks = {late_one("control.fast", 10 * kMillisecond, 25), late_one("control.slow", 500 * kMillisecond, 1)};
+  snapshot.tasks[1].stats.execution_max = 60 * kMillisecond;
+  std::vector<std::string> lines = closing_lines(snapshot);
+  ASSERT_EQ(lines.size(), 3);
+  EXPECT_EQ(lines[0], "preemption none on 1 worker: all was as promised");
+  EXPECT_EQ(lines[1], "rates are known of 2 callbacks");
+  EXPECT_THAT(lines[2], AllOf(HasSubstr("200 jobs with deadlines, 26 missed, most by control.fast (25 of 100)"),
+                              HasSubstr("control.slow, which executes for up to 60ms"), HasSubstr("real-time")));
+
+  snapshot.mode.mode = redag::PreemptionMode::Os;  // preempts it: that is no cause any more
+  EXPECT_THAT(closing_lines(snapshot)[2], HasSubstr("more urgent: more workers"));
+
+  snapshot.tasks[0].stats.execution_p99 = snapshot.tasks[0].stats.execution_max = 12 * kMillisecond;
+  EXPECT_THAT(closing_lines(snapshot)[2], HasSubstr("executes for up to 12ms, longer than its deadline of 10ms"));
+}
+
+TEST(ClosingLines, SayWhatIsNotKnownAndNotAsPromised) {
+  Snapshot snapshot;
+  snapshot.workers = 2;
+  snapshot.warnings = {"the record is lost", "a limit is low"};
+  snapshot.tasks = {late_one("/robot subscription /odd (0)", 100 * kMillisecond, 3)};
+  snapshot.tasks[0].has_deadline = false;
+  snapshot.tasks[0].stats.id.kind = redag::Callback::Kind::Subscription;
+  EXPECT_THAT(closing_lines(snapshot), ElementsAre(HasSubstr("not as promised: the record is lost and 1 other"),
+                                                   HasSubstr("0 callbacks, but not of /robot subscription /odd (0)"),
+                                                   "0 jobs with deadlines, 0 missed"));
+}
+
 }  // namespace
 }  // namespace redag_rclcpp

@@ -127,6 +127,11 @@ class Monitor::Impl : public std::enable_shared_from_this<Impl> {
 
 void Monitor::Impl::start() {
   create_entities();
+  RCLCPP_INFO(node_->get_logger(), "a callback without a stated period has the priority of one of %s%s",
+              redag::humanize_duration(options_.default_period.count()).c_str(),
+              executor_.learning_done() ? "" : ", until its rate is learned");
+  RCLCPP_INFO(node_->get_logger(), "'redag top' shows the callbacks while they run, %s and %s report their misses",
+              diagnostics_->get_topic_name(), metrics_->get_topic_name());
   if (has_bounds_ || !options_.trace.empty() || options_.period.count() > 0) thread_ = std::thread([this] { main(); });
 }
 
@@ -317,7 +322,7 @@ redag::Result<void> Monitor::Impl::finish() {
   const bool has_trace = !options_.trace.empty();
   if (has_bounds_ || has_trace) drain();
   const Snapshot last = snapshot();
-  RCLCPP_INFO(node_->get_logger(), "%s", summarize(last).c_str());
+  for (const std::string &line : closing_lines(last)) RCLCPP_INFO(node_->get_logger(), "%s", line.c_str());
 
   redag::Diagnostics problems;
   if (has_trace) {

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "redag/base/time.hpp"
+#include "redag/base/words.hpp"
 #include "redag_analysis/metrics/assumptions.hpp"
 
 namespace redag_rclcpp {
@@ -21,6 +22,8 @@ using redag::humanize_duration;
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kMostNames = 3;  // in a line of the log
 
 Json distribution(redag::Duration p50, redag::Duration p99, redag::Duration max) {
   return Json{{"p50_ns", p50}, {"p99_ns", p99}, {"max_ns", max}};
@@ -115,6 +118,28 @@ DiagnosticStatus executor_status(const Snapshot &snapshot) {
   return status;
 }
 
+// Judges by figures alone. 'redag why' judges by a trace.
+std::string likely_cause(const CallbackStats &late, const Snapshot &snapshot) {
+  if (late.execution_p99 > late.deadline) {
+    return fmt::format("it executes for up to {}, longer than its deadline of {}: shorten it, or lengthen its period",
+                       humanize_duration(late.execution_max), humanize_duration(late.deadline));
+  }
+  const CallbackStats *longest = nullptr;
+  for (const TaskFigures &task : snapshot.tasks) {
+    if (task.stats.period <= late.period) continue;
+    if (longest == nullptr || task.stats.execution_max > longest->execution_max) longest = &task.stats;
+  }
+  const bool preempts = snapshot.mode.mode == redag::PreemptionMode::Os;
+  if (!preempts && longest != nullptr && longest->execution_max > late.deadline - late.execution_p50) {
+    return fmt::format(
+        "it probably waits for less urgent callbacks such as {}, which executes for up to {}: allow real-time "
+        "priorities, so that it preempts them ('redag doctor' says how), or more workers",
+        longest->task, humanize_duration(longest->execution_max));
+  }
+  return "it probably waits for callbacks that are more urgent: more workers, or longer periods of those ('redag why' "
+         "names them in a trace; the parameter 'trace' records one)";
+}
+
 }  // namespace
 
 std::string to_json(const Snapshot &snapshot) {
@@ -137,21 +162,39 @@ std::string to_json(const Snapshot &snapshot) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-std::string summarize(const Snapshot &snapshot) {
+std::vector<std::string> closing_lines(const Snapshot &snapshot) {
   std::uint64_t released = 0;
   std::uint64_t misses = 0;
+  std::size_t known = 0;
+  std::vector<std::string> unknown;
   const TaskFigures *worst = nullptr;
   for (const TaskFigures &task : snapshot.tasks) {
-    if (!task.has_deadline) continue;
-    released += task.stats.jobs.released;
-    misses += task.stats.misses;
-    if (task.stats.misses > 0 && (worst == nullptr || task.stats.misses > worst->stats.misses)) worst = &task;
+    const CallbackStats &stats = task.stats;
+    if (is_ros_internal(stats.id) || stats.jobs.released == 0) continue;
+    if (!task.has_deadline) {
+      if (stats.id.kind == redag::Callback::Kind::Subscription) unknown.push_back(stats.task);
+      continue;
+    }
+    ++known;
+    released += stats.jobs.released;
+    misses += stats.misses;
+    if (stats.misses > 0 && (worst == nullptr || stats.misses > worst->stats.misses)) worst = &task;
   }
-  std::string text = fmt::format("{} jobs with deadlines, {} missed", released, misses);
+  std::vector<std::string> lines;
+  lines.push_back(
+      fmt::format("preemption {} on {}: ", to_string(snapshot.mode.mode), redag::plural(snapshot.workers, "worker")) +
+      (snapshot.warnings.empty() ? "all was as promised"
+                                 : "not as promised: " + redag::join_first(snapshot.warnings, 1)));
+  lines.push_back(fmt::format("rates are known of {}", redag::plural(known, "callback")) +
+                  (unknown.empty() ? ""
+                                   : ", but not of " + redag::join_first(unknown, kMostNames) +
+                                         ": state their periods in a workload file (~/save writes one)"));
+  lines.push_back(fmt::format("{} jobs with deadlines, {} missed", released, misses));
   if (worst != nullptr) {
-    text += fmt::format(", most by {} ({} of {})", worst->stats.task, worst->stats.misses, worst->stats.jobs.released);
+    lines.back() += fmt::format(", most by {} ({} of {}): {}", worst->stats.task, worst->stats.misses,
+                                worst->stats.jobs.released, likely_cause(worst->stats, snapshot));
   }
-  return text;
+  return lines;
 }
 
 void drop_idle_tasks(redag::Workload &workload, const std::set<std::string> &configured) {

@@ -45,8 +45,9 @@ struct Snapshot {
 /// The snapshot as JSON, "redag.metrics/1" (docs/results_format.md), on one line.
 [[nodiscard]] std::string to_json(const Snapshot &snapshot);
 
-/// A summary on one line: jobs, misses, and the task with the most misses.
-[[nodiscard]] std::string summarize(const Snapshot &snapshot);
+/// Three lines for the end of a run: whether all was as promised; which rates are known; jobs, misses, and the callback
+/// with the most of them, with the likely cause and what helps.
+[[nodiscard]] std::vector<std::string> closing_lines(const Snapshot &snapshot);
 
 /// Removes tasks that never ran (unused services, events of publishers), except those of the DAGs in `configured`. Then
 /// removes DAGs without tasks. Such tasks and DAGs would prevent an analysis of the workload.
