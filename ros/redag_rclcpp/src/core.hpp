@@ -92,9 +92,6 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
   [[nodiscard]] redag::Duration learning_time() const override { return learning_.time(); }
   void rate_seen() override;
   void let_wait() override;
-  [[nodiscard]] std::shared_ptr<Callback> find_in_group(redag::TaskId member, const void *entity) const override {
-    return tasks_.find_in_group(member, entity);
-  }
   [[nodiscard]] redag::runtime::DeviceHandle device(const std::string &name) const override;
 
  private:

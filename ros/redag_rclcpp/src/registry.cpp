@@ -253,7 +253,6 @@ void Registry::add(const Entity &found, redag::CallbackId id) {
 
   const std::shared_ptr<Callback> callback = found.make(executor_.lock(), entry.id);
   entry.callback = callback;
-  entry.entity = found.key;
   callback->set_deadline(entry.task.deadline);
   // A timer waits for predecessors that come later, too. Other callbacks are then added anew: see still_plain().
   const bool is_timer = entry.id.kind == redag::Callback::Kind::Timer;

@@ -130,16 +130,6 @@ CallbackPlace TaskTable::place(const Entry &entry) const {
   return place;
 }
 
-std::shared_ptr<Callback> TaskTable::find_in_group(TaskId member, const void *entity) const {
-  const redag::LockGuard guard(lock_);
-  const std::string &group = entries_.at(member.value).task.group;
-  if (group.empty()) return nullptr;
-  for (const Entry &entry : entries_) {
-    if (entry.callback && entry.entity == entity) return entry.task.group == group ? entry.callback : nullptr;
-  }
-  return nullptr;
-}
-
 std::vector<Endpoint> TaskTable::endpoints() const {
   struct Row {
     std::size_t task;

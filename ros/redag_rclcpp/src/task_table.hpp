@@ -30,7 +30,6 @@ class TaskTable {
   /// A task that the scheduler has, or had.
   struct Entry {
     std::shared_ptr<Callback> callback;  // null once dropped
-    const void *entity = nullptr;        // address of rclcpp's object
     redag::CallbackId id;
     redag::Task task;
     std::uint32_t dag = 0;          // position in dags()
@@ -62,8 +61,6 @@ class TaskTable {
   [[nodiscard]] std::string name_of(redag::TaskId task) const;
 
   [[nodiscard]] CallbackPlace place_of(redag::TaskId task) const;
-  /// See ExecutorContext.
-  [[nodiscard]] std::shared_ptr<Callback> find_in_group(redag::TaskId member, const void *entity) const;
   /// The clients, and the servers with inputs that were not taken.
   [[nodiscard]] std::vector<Endpoint> endpoints() const;
 

@@ -458,35 +458,6 @@ bool ArrivalCallback::execute_token(const Token &token) {
   return taken;
 }
 
-// ---- jobs of others that handle arrivals ----
-
-void ArrivalCallback::hold_releases() {
-  const redag::LockGuard guard(lock_);
-  ++released_;
-}
-
-bool ArrivalCallback::handle_next() {
-  Token token;
-  {
-    const redag::LockGuard guard(lock_);
-    if (tokens_.empty()) return false;
-    token = tokens_.pop();
-  }
-  (void)execute_token(token);
-  return true;
-}
-
-void ArrivalCallback::resume_releases() {
-  Release release;
-  {
-    const redag::LockGuard guard(lock_);
-    --released_;
-    if (!begin_release(release)) return;
-  }
-  engine().release(release, engine().now());
-  end_release();
-}
-
 // ---- messages of skipped jobs ----
 
 // Counts one message as dropped. False: none remains to be dropped; some may have been overwritten meanwhile.

@@ -98,12 +98,6 @@ class ArrivalCallback : public Callback, public Hooked {
     joined_ = true;
     return redag::Activation::Data;
   }
-  /// Between these two calls no jobs are released: a job of another callback, which holds this one's group, calls
-  /// handle_next(). For callbacks that drop no messages.
-  void hold_releases() REDAG_EXCLUDES(lock_);
-  void resume_releases() REDAG_EXCLUDES(lock_);
-  /// Handles one arrival. Returns false if there is none. Throws what the user's function throws.
-  [[nodiscard]] bool handle_next() REDAG_EXCLUDES(lock_);
   /// For the constructors of callbacks that have an exchange(): the executor is told of what arrives.
   void take_part_in_exchange() { takes_part_ = true; }
   /// There may be more messages of `source` than tokens: releases jobs until nothing is left.
@@ -185,10 +179,9 @@ class ArrivalCallback : public Callback, public Hooked {
   std::size_t dropping_[2] REDAG_GUARDED_BY(lock_) = {0, 0};  // part of kept_: to be dropped by the next job
   std::atomic<bool> leftovers_[2] = {false, false};           // there may be more messages than tokens
   std::atomic<bool> came_[2] = {false, false};                // messages have come; if from both, some are copies
-  // Jobs in the scheduler, or whose skip it has yet to report. hold_releases() counts as one.
-  std::uint32_t released_ REDAG_GUARDED_BY(lock_) = 0;
-  bool noted_ REDAG_GUARDED_BY(lock_) = false;  // noted by note(), not yet admitted
-  bool seen_ REDAG_GUARDED_BY(lock_) = false;   // seen by the wait set, not yet handled
+  std::uint32_t released_ REDAG_GUARDED_BY(lock_) = 0;  // jobs in the scheduler, or whose skip it has yet to report
+  bool noted_ REDAG_GUARDED_BY(lock_) = false;          // noted by note(), not yet admitted
+  bool seen_ REDAG_GUARDED_BY(lock_) = false;           // seen by the wait set, not yet handled
   std::vector<TaskId> publishers_ REDAG_GUARDED_BY(lock_);
   std::uint64_t arrivals_[2] REDAG_GUARDED_BY(lock_) = {0, 0};
   // Messages from the middleware, counted if intra-process communication delivers messages as well.

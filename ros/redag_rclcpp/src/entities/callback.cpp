@@ -37,10 +37,6 @@ std::shared_ptr<ExecutorContext> Callback::context_now() const {
 
 redag::runtime::DeviceHandle Callback::device(const std::string &name) const { return context_now()->device(name); }
 
-std::shared_ptr<Callback> Callback::in_own_group(const void *entity) const {
-  return context_now()->find_in_group(task(), entity);
-}
-
 void Callback::let_wait() const {
   const std::shared_ptr<ExecutorContext> context = context_now();
   if (!context->direct()) {

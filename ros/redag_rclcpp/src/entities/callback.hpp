@@ -58,9 +58,6 @@ class Callback : public TimerQueue::Timer,
   void let_wait() const;
   /// See ExecutorContext.
   [[nodiscard]] redag::runtime::DeviceHandle device(const std::string &name) const;
-  /// The callback of this entity if it is in the same mutually exclusive group as this one; otherwise null. Throws
-  /// redag::WaitCancelled once detached.
-  [[nodiscard]] std::shared_ptr<Callback> in_own_group(const void *entity) const;
   /// Called at the end of a job's coroutine, in the job.
   void coroutine_ended();
   /// True if the middleware takes messages back when the callback returns.

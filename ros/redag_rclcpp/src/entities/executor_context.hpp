@@ -44,8 +44,6 @@ class ExecutorContext {
   /// Called before a job can wait. The first call creates the engine's threads for that. Throws std::runtime_error if
   /// the system refuses them.
   virtual void let_wait() = 0;
-  /// The callback of this entity if it is in the same mutually exclusive group as that of `member`; otherwise null.
-  [[nodiscard]] virtual std::shared_ptr<Callback> find_in_group(redag::TaskId member, const void *entity) const = 0;
   /// Throws std::out_of_range if the executor has no device of this name.
   [[nodiscard]] virtual redag::runtime::DeviceHandle device(const std::string &name) const = 0;
 };

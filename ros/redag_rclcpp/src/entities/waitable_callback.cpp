@@ -4,7 +4,6 @@
 // Waitables as callbacks: action servers and clients, QoS events, and what users derive from rclcpp::Waitable.
 #include <rcl/event_callback.h>
 
-#include <atomic>
 #include <functional>
 #include <memory>
 #include <string>
@@ -15,7 +14,6 @@
 #include "entities/arrival_callback.hpp"
 #include "entities/entities.hpp"
 #include "entities/hook.hpp"
-#include "entities/stand_in.hpp"
 #include "redag_rclcpp/join.hpp"
 
 namespace redag_rclcpp {
@@ -35,7 +33,7 @@ Exchange exchange_of(const rclcpp::Waitable &waitable) {
   return exchange;
 }
 
-class WaitableCallback final : public ArrivalCallback, public ActionClientCallback {
+class WaitableCallback final : public ArrivalCallback {
  public:
   WaitableCallback(std::shared_ptr<ExecutorContext> context, redag::CallbackId id,
                    const rclcpp::Waitable::SharedPtr &waitable)
@@ -50,32 +48,6 @@ class WaitableCallback final : public ArrivalCallback, public ActionClientCallba
   // Other waitables can need a call for each time that they are ready.
   [[nodiscard]] bool can_join() const override { return is_join_; }
   [[nodiscard]] Exchange exchange() const override { return exchange_; }
-
-  // Functions of ActionClientCallback.
-  void begin_stand_in(redag::AsyncEvent &event) override {
-    {
-      const redag::LockGuard guard(lock_);
-      stand_in_.store(&event, std::memory_order_release);
-    }
-    hold_releases();
-  }
-  [[nodiscard]] bool stand_in() override { return handle_next(); }
-  void end_stand_in() override {
-    {
-      const redag::LockGuard guard(lock_);
-      stand_in_.store(nullptr, std::memory_order_release);
-    }
-    resume_releases();
-  }
-
-  void seen_by_wait_set() override {
-    ArrivalCallback::seen_by_wait_set();
-    wake_stand_in();
-  }
-  void take_leftovers(const Held &held, rcl_wait_set_t &set, bool any) override {
-    ArrivalCallback::take_leftovers(held, set, any);
-    wake_stand_in();
-  }
 
   // The on-ready hook also reports what was ready before.
   [[nodiscard]] Held hooked() const override { return {}; }
@@ -106,7 +78,6 @@ class WaitableCallback final : public ArrivalCallback, public ActionClientCallba
     waitable->set_on_ready_callback(
         [self = std::static_pointer_cast<WaitableCallback>(shared_from_this())](std::size_t count, int part) {
           self->arrived(count, Source::Middleware, part);
-          self->wake_stand_in();
         });
   }
   void unhook() override {
@@ -119,13 +90,6 @@ class WaitableCallback final : public ArrivalCallback, public ActionClientCallba
     } catch (const std::exception &) {
       // Setting this hook had failed as well.
     }
-  }
-
-  // The event is set under the lock: the job calls end_stand_in() before it destroys it.
-  void wake_stand_in() {
-    if (stand_in_.load(std::memory_order_acquire) == nullptr) return;
-    const redag::LockGuard guard(lock_);
-    if (redag::AsyncEvent *const event = stand_in_.load(std::memory_order_relaxed)) event->set();
   }
 
   [[nodiscard]] bool is_hooked_by_user() const override {
@@ -151,9 +115,8 @@ class WaitableCallback final : public ArrivalCallback, public ActionClientCallba
   const std::weak_ptr<rclcpp::Waitable> waitable_;
   const Exchange exchange_;
   const bool is_join_;
-  Hook event_hook_;                                     // of a QoS event whose hook is set below rclcpp
-  bool hooked_ = false;                                 // hook() has set the on-ready hook, even if that failed
-  std::atomic<redag::AsyncEvent *> stand_in_{nullptr};  // of the job that stands in; written under lock_
+  Hook event_hook_;      // of a QoS event whose hook is set below rclcpp
+  bool hooked_ = false;  // hook() has set the on-ready hook, even if that failed
 };
 
 }  // namespace
