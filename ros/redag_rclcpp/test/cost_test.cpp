@@ -5,6 +5,7 @@
 // executor is never idle. From some callback on, its thread has a stepped clock: all callbacks are short, whatever the
 // machine does.
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <atomic>
 #include <memory>
@@ -100,6 +101,41 @@ TEST_P(CostTest, AShortCallbackReadsTheClockTwice) {
   redag::testing::SystemCalls calls;
   const Cost cost = measure(calls, false);
   EXPECT_LE(cost.clocks, 2u * kCount + kNowAndThen);
+}
+
+// The callback releases its next job before it ends. A second worker that is woken for each of them, and finds it
+// taken, makes the ring several times slower.
+TEST_P(CostTest, ASecondWorkerIsNotWokenForEachCallback) {
+  constexpr int kCalls = 5000;
+  const auto switches = [] {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return usage.ru_nvcsw;
+  };
+  std::atomic<long> before{0};
+  std::atomic<long> after{0};
+  std::atomic<int> called{0};
+  const auto out = publisher("ring");
+  rclcpp::SubscriptionOptions reentrant;
+  reentrant.callback_group = groups.emplace_back(node->create_callback_group(rclcpp::CallbackGroupType::Reentrant));
+  const auto in = node->create_subscription<Empty>(
+      "ring", rclcpp::QoS(10),
+      [&](Empty::ConstSharedPtr) {
+        const int call = called++;
+        if (call == kWarm) before = switches();
+        if (call == kWarm + kCalls) after = switches();
+        if (call < kWarm + kCalls) out->publish(std::make_unique<Empty>());
+      },
+      reentrant);
+  options.workers = 2;
+  ReDAGExecutor executor(options);
+  executor.add_node(node);
+  {
+    const Spinner spinner(executor);
+    out->publish(std::make_unique<Empty>());
+    ASSERT_TRUE(eventually([&] { return after.load() > 0; }));
+  }
+  EXPECT_LE(after - before, kCalls / 5);
 }
 
 }  // namespace
