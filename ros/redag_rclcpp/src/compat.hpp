@@ -194,28 +194,13 @@ inline auto services_qos() {
 
 // ---- timers ----
 
-/// A timer's call. The constructor consumes the expiry, which makes the next one known; execute() runs the callback.
-class TimerCall {
- public:
-  explicit TimerCall(rclcpp::TimerBase &timer) : timer_(timer), data_(timer.call()) {}
-
-  /// False: the timer was cancelled.
-  [[nodiscard]] bool valid() const { return static_cast<bool>(data_); }
-
+/// Consumes a timer's expiry, which makes the next one known. False or null: the timer was cancelled.
+[[nodiscard]] inline auto begin_call(rclcpp::TimerBase &timer) { return timer.call(); }
 #if RCLCPP_VERSION_MAJOR >= 28
-  void execute() { timer_.execute_callback(data_); }
-
- private:
-  rclcpp::TimerBase &timer_;
-  std::shared_ptr<void> data_;
+inline void execute(rclcpp::TimerBase &timer, const std::shared_ptr<void> &call) { timer.execute_callback(call); }
 #else
-  void execute() { timer_.execute_callback(); }
-
- private:
-  rclcpp::TimerBase &timer_;
-  bool data_;
+inline void execute(rclcpp::TimerBase &timer, bool) { timer.execute_callback(); }
 #endif
-};
 
 /// True if the timer itself reports resets. Otherwise its guard condition does. Jumps of ROS time are always reported
 /// by the guard condition.

@@ -180,6 +180,7 @@ void ReDAGExecutor::Core::admit(bool look_around) {
   learning_.look(engine_->now());
   if (registry_.is_stale()) registry_.collect();
   if (look_around && !bridge_.empty()) bridge_.wait(nanoseconds(0));
+  bridge_.destroy_dropped();
   (void)timer_.expire();
   admit_noted();
 }
@@ -279,6 +280,7 @@ void ReDAGExecutor::Core::keep_house(MiddlewareWatch *middleware) {
   while (hooks_.may_spin() && !wait_set_done_) {
     const bool is_stale = registry_.is_stale();
     if (is_stale) registry_.collect();
+    bridge_.destroy_dropped();
     const redag::Time now = engine_->now();
     if (middleware != nullptr) middleware->look(now, is_stale);
     learning_.look(now);
@@ -302,6 +304,7 @@ void ReDAGExecutor::Core::watch_wait_set() noexcept {
     while (hooks_.may_spin() && !wait_set_done_) {
       admit_noted();
       bridge_.wait(nanoseconds(-1));
+      if (bridge_.has_dropped()) keeper_parker_.unpark();
     }
   } catch (...) {
     // One cause is a context that was shut down while the wait set was filled.
@@ -322,6 +325,7 @@ void ReDAGExecutor::Core::stop_workers() {
   engine_->end_started();
   direct_ = false;
   deadlock_watch_.jobs_ended();
+  bridge_.destroy_dropped();
 }
 
 void ReDAGExecutor::Core::spin_ready(nanoseconds max_duration, bool exhaustive) {

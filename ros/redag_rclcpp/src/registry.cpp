@@ -51,6 +51,7 @@ void Registry::change(const std::function<void()> &change) {
     change();
   }
   collect();
+  parts_.bridge.destroy_dropped();
 }
 
 void Registry::add_node(const NodeBase::SharedPtr &node) {

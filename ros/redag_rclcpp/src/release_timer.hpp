@@ -57,8 +57,7 @@ class ReleaseTimer {
   redag::PiMutex expire_lock_;
   std::vector<redag::runtime::Release> due_ REDAG_GUARDED_BY(expire_lock_);
   std::vector<redag::runtime::Release> missed_ REDAG_GUARDED_BY(expire_lock_);
-  int in_a_row_ =
-      0;  // releases after which the next one was due already; release_due() only, which is never concurrent
+  int in_a_row_ = 0;  // expiries after which the next one was due already; of release_due(), which is never concurrent
   redag::runtime::ReleaseThread thread_;  // last: it uses the others until it is destroyed
 };
 

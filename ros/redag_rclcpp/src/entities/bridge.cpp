@@ -78,10 +78,12 @@ void Bridge::wake() {
 }
 
 void Bridge::wait(std::chrono::nanoseconds timeout) {
-  // Declared before `entries`, hence destroyed after it: a thread in remove() still owns the member when `entries`
-  // releases it. Otherwise this thread, which is more urgent than all jobs, could be the one to destroy it.
+  // A thread in remove() still owns a member that `entries` releases. This thread, above all jobs, destroys none.
+  std::vector<Entry> entries;
   const struct Leave {
     ~Leave() {
+      bridge.keep_dropped(entries);
+      entries.clear();
       {
         const redag::LockGuard guard(bridge.lock_);
         bridge.waiter_ = {};
@@ -90,8 +92,8 @@ void Bridge::wait(std::chrono::nanoseconds timeout) {
       redag::futex_wake(bridge.left_, INT_MAX);
     }
     Bridge &bridge;
-  } leave{*this};
-  std::vector<Entry> entries;
+    std::vector<Entry> &entries;
+  } leave{*this, entries};
   {
     const redag::LockGuard guard(lock_);
     for (const auto &member : members_) entries.push_back(Entry{member, member->watched()});
@@ -111,6 +113,27 @@ void Bridge::wait(std::chrono::nanoseconds timeout) {
     entry.member->seen_by_wait_set();
   }
   if (!is_any_ready) std::this_thread::sleep_for(kUntilNextWait);
+}
+
+// Entities that the program has dropped have no owner but the wait now.
+void Bridge::keep_dropped(std::vector<Entry> &entries) {
+  const redag::LockGuard guard(lock_);
+  for (Entry &entry : entries) {
+    if (entry.held.entity.use_count() != 1) continue;
+    std::erase(members_, std::exchange(entry.member, nullptr));
+    dropped_.push_back(std::move(entry.held));
+  }
+}
+
+void Bridge::destroy_dropped() {
+  std::vector<WaitSetMember::Held> dropped;
+  const redag::LockGuard guard(lock_);
+  dropped.swap(dropped_);
+}
+
+bool Bridge::has_dropped() const {
+  const redag::LockGuard guard(lock_);
+  return !dropped_.empty();
 }
 
 void Bridge::fill(rcl_wait_set_t &set, const std::vector<const rclcpp::GuardCondition *> &conditions,

@@ -42,11 +42,16 @@ class Bridge {
   /// Waits until something is ready, and tells the members concerned. A negative timeout means no limit.
   void wait(std::chrono::nanoseconds timeout);
 
+  /// Destroys what the program dropped while a wait held it. The caller holds no lock, and is not above all jobs.
+  void destroy_dropped();
+  [[nodiscard]] bool has_dropped() const;
+
  private:
   struct Entry {
     std::shared_ptr<WaitSetMember> member;
     WaitSetMember::Held held;
   };
+  void keep_dropped(std::vector<Entry> &entries);
   static void fill(rcl_wait_set_t &set, const std::vector<const rclcpp::GuardCondition *> &conditions,
                    std::vector<Entry> &entries);
   friend void find_leftovers(const rclcpp::Context::SharedPtr &context,
@@ -59,6 +64,7 @@ class Bridge {
 
   mutable redag::PiMutex lock_;  // inherits priority: threads of all priorities add and remove
   std::vector<std::shared_ptr<WaitSetMember>> members_ REDAG_GUARDED_BY(lock_);
+  std::vector<WaitSetMember::Held> dropped_ REDAG_GUARDED_BY(lock_);
   std::thread::id waiter_ REDAG_GUARDED_BY(lock_);   // thread in rcl_wait(), if any
   std::uint64_t waits_ REDAG_GUARDED_BY(lock_) = 0;  // number of waits that have begun
   redag::FutexWord left_{0};                         // number of waits that have ended

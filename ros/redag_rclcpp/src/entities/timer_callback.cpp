@@ -245,11 +245,10 @@ Time TimerCallback::expire(Time now, std::vector<Release> &releases, std::vector
 }
 
 // Consumes the expiry of a skipped job if no other job will. A timer with a grid needs none of this: the next point's
-// job consumes the expiry.
+// job consumes the expiry. The release thread, which may call this, must not become the last owner of the timer.
 void TimerCallback::drop_expiry() {
-  const auto timer = timer_.lock();
-  if (!timer || (!is_simulated(*handle_) && period_of(*handle_) != 0)) return;
-  const compat::TimerCall call(*timer);
+  if (!is_simulated(*handle_) && period_of(*handle_) != 0) return;
+  if (rcl_timer_call(const_cast<rcl_timer_t *>(handle_.get())) != RCL_RET_OK) rcl_reset_error();
   uncalled_ = false;
   reschedule();
 }
@@ -269,36 +268,27 @@ bool TimerCallback::run(Time /*release*/) {
     return false;
   }
   TRACETOOLS_TRACEPOINT(rclcpp_executor_execute, static_cast<const void *>(handle_.get()));
-  compat::TimerCall call(*timer);
-  if (!call.valid()) return false;
+  const auto call = compat::begin_call(*timer);
+  if (!call) return false;
   const Duration period = period_of(*handle_);
   if (known_period_.exchange(period) != period) tell_period();
   const bool always_due = period == 0;
   if (!always_due) reschedule();
-  call.execute();
+  compat::execute(*timer, call);
   if (always_due) reschedule();
   return true;
 }
 
 }  // namespace
 
-Entity entity_of(const rclcpp::TimerBase::SharedPtr &timer) {
-  return {.key = timer.get(),
-          .id = {.kind = redag::Callback::Kind::Timer,
-                 .node = {},
-                 .name = {},
-                 .period = period_of(*timer->get_timer_handle())},
-          .make = [timer](std::shared_ptr<ExecutorContext> context, redag::CallbackId id) {
-            return std::make_shared<TimerCallback>(std::move(context), std::move(id), timer, nullptr);
-          }};
-}
+Entity entity_of(const rclcpp::TimerBase::SharedPtr &timer) { return entity_of(nullptr, timer); }
 
 Entity entity_of(const rclcpp::Waitable::SharedPtr &waitable, const rclcpp::TimerBase::SharedPtr &timer) {
   return {.key = timer.get(),
           .owner = waitable.get(),
-          .id = {.kind = redag::Callback::Kind::Waitable,
+          .id = {.kind = waitable ? redag::Callback::Kind::Waitable : redag::Callback::Kind::Timer,
                  .node = {},
-                 .name = "timer",
+                 .name = waitable ? "timer" : "",
                  .period = period_of(*timer->get_timer_handle())},
           .make = [waitable, timer](std::shared_ptr<ExecutorContext> context, redag::CallbackId id) {
             return std::make_shared<TimerCallback>(std::move(context), std::move(id), timer, waitable);
