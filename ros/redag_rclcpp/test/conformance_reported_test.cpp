@@ -122,6 +122,20 @@ TYPED_TEST(Conformance, StepsOfTheClockStopNoWallTimerAndNoMessage) {
   }
 }
 
+// ros2/ros2#1081: the time of day was an hour back for a while. Timers of a node's clock go on when it is right again.
+TYPED_TEST(Conformance, TimersOfANodesClockGoOnAfterItWasWrong) {
+  if (!kOurs<TypeParam>) GTEST_SKIP() << "about what ReDAGExecutor promises";
+  std::atomic<int> expiries{0};
+  auto timer = rclcpp::create_timer(this->node, this->node->get_clock(), rclcpp::Duration(10ms), [&] { ++expiries; });
+  this->executor->add_node(this->node);
+  Spinner spinner(*this->executor);
+  EXPECT_TRUE(eventually([&] { return expiries >= 5; }));
+  clock_step = -3600;
+  std::this_thread::sleep_for(300ms);
+  clock_step = 0;
+  EXPECT_TRUE(eventually([&, before = expiries.load()] { return expiries >= before + 5; }));
+}
+
 // ros2/rclcpp#2402: a timer whose callback takes longer than its period must not stop what is more urgent.
 TEST(ReportedProblems, ASlowTimerDoesNotStopMoreUrgentMessages) {
   rclcpp::init(0, nullptr);

@@ -273,5 +273,25 @@ TYPED_TEST(Conformance, SpinOnceRunsOneAndTimesOut) {
   EXPECT_EQ(count, 3);
 }
 
+TYPED_TEST(Conformance, TheLongestDurationIsNoLimit) {
+  if (!kOurs<TypeParam>) GTEST_SKIP() << "signed numbers overflow";
+  int calls = 0;
+  std::vector<rclcpp::TimerBase::SharedPtr> timers;
+  const auto once = [&](std::chrono::milliseconds period) {
+    timers.push_back(this->node->create_wall_timer(period, [&, at = timers.size()] {
+      ++calls;
+      timers[at]->cancel();
+    }));
+  };
+  for (int i = 0; i < 5; ++i) once(1ms);
+  this->executor->add_node(this->node);
+  std::this_thread::sleep_for(5ms);
+  this->executor->spin_some(std::chrono::nanoseconds::max());
+  EXPECT_EQ(calls, 5);
+  once(50ms);
+  this->executor->spin_once(std::chrono::nanoseconds::max());
+  EXPECT_EQ(calls, 6) << "it did not wait";
+}
+
 }  // namespace
 }  // namespace redag_rclcpp

@@ -216,6 +216,7 @@ dags:
     ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
     executor.set_live_bounds({{"control.tick", 3 * redag::kMillisecond}});
     auto timer = node->create_wall_timer(10ms, [] {});
+    auto never = node->create_wall_timer(std::chrono::hours(24 * 365 * 150), [] {});  // more than a page can hold
     executor.add_node(node);
     Spinner spinner(executor);
     std::optional<redag::live::Frame> frame;
@@ -593,6 +594,34 @@ TEST_P(ExecutorTest, ABurstOfRequestsIsNoRate) {
 
 // If another process subscribes as well (a recorder, rviz), the middleware brings every message a second time. rclcpp
 // ignores the copy, and learning must not count it.
+// As on /tf: a slow timer of the executor and a fast program outside publish to one topic.
+TEST_P(ExecutorTest, ATopicToWhichOthersPublishFollowsNoTimer) {
+  options.learn = 500ms;
+  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  const auto out = publisher("/both");
+  const auto timer = node->create_wall_timer(
+      100ms, [&] { out->publish(Empty()); }, new_group());
+  const auto subscription = subscribe("/both", [] {});
+  executor.add_node(node);
+  const Spinner spinner(executor);
+  const auto publish = [&] {
+    out->publish(Empty());  // in no job of the executor
+    std::this_thread::sleep_for(2ms);
+  };
+  ASSERT_TRUE(eventually([&] { return executor.learning_done(); }, publish));
+  EXPECT_TRUE(eventually([&] {
+    const std::vector<CallbackStats> all = executor.stats();
+    return std::any_of(all.begin(), all.end(), [](const CallbackStats &stats) {
+      return stats.id.name == "/both" && stats.period < 50'000'000;
+    });
+  }));
+  for (const redag::Dag &dag : executor.learned().dags) {
+    for (const redag::Task &task : dag.tasks) {
+      if (task.name.find("both") != std::string::npos) EXPECT_THAT(task.predecessors, ::testing::IsEmpty());
+    }
+  }
+}
+
 TEST_P(ExecutorTest, LearnsARateOnceWhereOthersSubscribeToo) {
   options.learn = 1s;
   ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);

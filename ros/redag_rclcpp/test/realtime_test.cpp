@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -97,6 +98,45 @@ TEST_P(RealtimeTest, CollectingEntitiesIsNoneOfTheUrgentWork) {
       return std::find(threads.begin(), threads.end(), expected) != threads.end();
     })) << name;
   }
+}
+
+// The wait set holds a subscription whose hook the user has set. If the program drops it meanwhile, what its callback
+// captured is destroyed on the thread that spins.
+TEST_P(RealtimeTest, WhatIsDroppedWhileItIsWaitedForIsNotDestroyedAboveJobs) {
+  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  std::atomic<int> priority{-1};
+  std::shared_ptr<void> captured(&priority, [](void *noted) {
+    *static_cast<std::atomic<int> *>(noted) = redag::runtime::fifo_priority(pthread_self());
+  });
+  std::atomic<int> calls{0};
+  auto subscription = subscribe("/dropped", [&calls, captured] { ++calls; });
+  captured.reset();
+  subscription->set_on_new_message_callback([](std::size_t) {});
+  const auto topic = publisher("/dropped");
+  executor.add_node(node);
+  Spinner spinner(executor);
+  ASSERT_TRUE(eventually([&] { return calls > 0; },
+                         [&] {
+                           topic->publish(Empty());
+                           std::this_thread::sleep_for(5ms);
+                         }));
+  std::this_thread::sleep_for(100ms);  // until the wait set watches it again
+  subscription.reset();
+  EXPECT_EQ(priority, -1) << "nothing else holds it";
+  spinner.stop();
+  EXPECT_EQ(priority, 0);
+}
+
+// Made while the executor is there, as by components. Its due time lies beyond the largest number there is.
+TEST_P(RealtimeTest, ATimerThatNeverExpiresTakesNoProcessor) {
+  ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
+  executor.add_node(node);
+  const Spinner spinner(executor);
+  const auto never = node->create_wall_timer(std::chrono::nanoseconds::max(), [] {});
+  std::this_thread::sleep_for(100ms);
+  const std::clock_t before = std::clock();
+  std::this_thread::sleep_for(500ms);
+  EXPECT_LT(std::clock() - before, CLOCKS_PER_SEC / 4);
 }
 
 // The thread that called spin() is an ordinary one. It gets no processor while jobs use all of them.
