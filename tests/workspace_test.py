@@ -111,6 +111,20 @@ class Colcon(unittest.TestCase):
         self.assertEqual(colcon_list("--packages-up-to", "redag_rclcpp"), ["redag", "redag_analysis", "redag_rclcpp"])
 
 
+class Scripts(unittest.TestCase):
+    """Scripts that need ROS 2 or rosdep find each package, though they rarely run."""
+
+    def test_the_documented_build_tries_each_package_alone(self):
+        text = (SOURCE / "tools" / "test_documented_build").read_text()
+        steps = re.findall(r'"([\w/]+)":', re.search(r"(?s)^STEPS = \{(.*?)\}", text, re.M)[1])
+        self.assertEqual({SOURCE / folder for folder in steps}, {folder_of(package) for package in PACKAGES})
+
+    def test_rosdep_learns_of_each_package(self):
+        patterns = re.search(r"for package in (\S*package\.xml.*); do", (SOURCE / "tools" / "debian_packages").read_text())[1]
+        found = {file.parent for pattern in patterns.split() for file in SOURCE.glob(pattern)}
+        self.assertEqual(found, {folder_of(package) for package in PACKAGES})
+
+
 class Citation(unittest.TestCase):
     def test_the_version_is_the_one_of_the_packages(self):
         stated = re.search(r"(?m)^version: (.+)$", (SOURCE / "CITATION.cff").read_text())[1]
