@@ -7,6 +7,7 @@
 
 #include <algorithm>
 
+#include "redag/base/words.hpp"
 #include "redag_analysis/metrics/assumptions.hpp"
 #include "redag_lab/search/analysed.hpp"
 
@@ -20,13 +21,12 @@ std::string describe(const analysis::AnalysisPlatform &platform, const trace::Ru
   const bool is_real = run.driver != trace::Driver::Simulator;
   const std::string none = is_real ? metrics::not_calibrated_hint() : "no overheads";
   const std::size_t clusters = run.workload.platform.clusters.size();
-  return fmt::format(
-      "{} worker{}{}, {} preemption, {}", platform.workers, platform.workers == 1 ? "" : "s",
-      clusters == 0 ? std::string() : fmt::format(" in {} cluster{}", clusters, clusters == 1 ? "" : "s"),
-      trace::preemption_name(platform.preemption),
-      run.overheads.empty() ? none
-      : is_real             ? "charged with the machine's overheads"
-                            : "charged with overheads " + run.overheads);
+  return fmt::format("{}{}, {} preemption, {}", plural(platform.workers, "worker"),
+                     clusters == 0 ? "" : " in " + plural(clusters, "cluster"),
+                     trace::preemption_name(platform.preemption),
+                     run.overheads.empty() ? none
+                     : is_real             ? "charged with the machine's overheads"
+                                           : "charged with overheads " + run.overheads);
 }
 
 RunBounds none(std::string why) {

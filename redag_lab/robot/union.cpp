@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "redag/base/words.hpp"
 #include "redag/loader/validate.hpp"
 #include "redag/sched/policy.hpp"
 #include "redag/threads/setup.hpp"
@@ -181,9 +182,9 @@ class Union {
     const std::size_t cpus = robot_.cpu_sets[process.cpu_set].cpus.size();
     if (process.states_workers && workload.platform.workers < cpus) {
       refuse(process.place,
-             fmt::format("process '{}' has {} worker{} for {} processors: a processor can be idle while a job waits, "
+             fmt::format("process '{}' has {} for {} processors: a processor can be idle while a job waits, "
                          "which no bound for all processes covers",
-                         process.name, workload.platform.workers, workload.platform.workers == 1 ? "" : "s", cpus),
+                         process.name, plural(workload.platform.workers, "worker"), cpus),
              fmt::format("write 'workers: {}' in its workload, or leave it out", cpus));
     }
   }

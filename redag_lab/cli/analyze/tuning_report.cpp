@@ -207,11 +207,10 @@ std::string describe(const Tuning &tuning, const StreamTraits &terminal, bool al
   if (options.judge == Judge::Bounds) {
     text += "judged by the bounds, which hold for every execution\n\n";
   } else {
-    text += fmt::format(
-        "simulated {} with {}; validated on {} unseen seed{}; settings that the bounds prove come first\n\n",
-        humanize_duration(options.simulation.duration),
-        options.seeds == 1 ? std::string("one seed") : fmt::format("each of {} seeds", options.seeds), options.held_out,
-        options.held_out == 1 ? "" : "s");
+    text += fmt::format("simulated {} with {}; validated on {}; settings that the bounds prove come first\n\n",
+                        humanize_duration(options.simulation.duration),
+                        options.seeds == 1 ? std::string("one seed") : fmt::format("each of {} seeds", options.seeds),
+                        plural(options.held_out, "unseen seed"));
   }
   text += scores_table(tuning, terminal);
   text += tried_tables(tuning, terminal, all) + "\n";

@@ -11,6 +11,7 @@
 
 #include "redag/base/check.hpp"
 #include "redag/base/text.hpp"
+#include "redag/base/words.hpp"
 #include "redag/trace/trace.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/files.hpp"
@@ -128,8 +129,8 @@ class Run {
     progress.clear();
     // A unit that Ctrl-C interrupted has no result, and this is no error.
     const bool good = InterruptGuard::interrupted() || ok(ran, console_);
-    console_.note(fmt::format("{} of {} units in {} on {} processor{}\n", finished, units.size(),
-                              humanize_duration(progress.elapsed()), jobs, jobs == 1 ? "" : "s"));
+    console_.note(fmt::format("{} of {} units in {} on {}\n", finished, units.size(),
+                              humanize_duration(progress.elapsed()), plural(jobs, "processor")));
     return ok(store.sync(), console_) && good;
   }
 

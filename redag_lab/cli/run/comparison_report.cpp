@@ -132,10 +132,9 @@ std::string describe(const lab::Comparison &comparison, const StreamTraits &term
   const bool simulated = comparison.driver == trace::Driver::Simulator;
   std::string text;
   for (const std::string &line : verdicts(comparison)) text += line + "\n";
-  text += fmt::format("\n{}: {} worker{}, {} repetition{} of {} {}, seed {}\n", comparison.workload, comparison.workers,
-                      comparison.workers == 1 ? "" : "s", repetitions, repetitions == 1 ? "" : "s",
-                      humanize_duration(comparison.duration), simulated ? "in virtual time" : "on threads",
-                      comparison.seed);
+  text += fmt::format("\n{}: {}, {} of {} {}, seed {}\n", comparison.workload, plural(comparison.workers, "worker"),
+                      plural(repetitions, "repetition"), humanize_duration(comparison.duration),
+                      simulated ? "in virtual time" : "on threads", comparison.seed);
   for (const lab::ExecutorResults &results : comparison.executors) {
     text += fmt::format("  {}: preemption {}{}\n", results.variant.name, results.preemption,
                         results.preemption_why.empty() ? "" : " (" + results.preemption_why + ")");

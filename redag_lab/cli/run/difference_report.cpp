@@ -65,10 +65,9 @@ std::string figure_text(const DifferenceRow &row, std::size_t figure) {
 std::string run_words(const DiffSide &side) {
   const std::vector<trace::RunInfo> &runs = side.jobs.runs();
   const trace::RunInfo &first = runs.front();
-  return fmt::format("{}: {}, {}, {} worker{}, {}, {} run{} of {}", side.name, first.executor, first.preemption,
-                     trace::worker_count(first), trace::worker_count(first) == 1 ? "" : "s",
-                     trace::to_string(first.driver), runs.size(), runs.size() == 1 ? "" : "s",
-                     humanize_duration(first.end - first.start));
+  return fmt::format("{}: {}, {}, {}, {}, {} of {}", side.name, first.executor, first.preemption,
+                     plural(trace::worker_count(first), "worker"), trace::to_string(first.driver),
+                     plural(runs.size(), "run"), humanize_duration(first.end - first.start));
 }
 
 // Counts the figures of this verdict. Response times count only where some job has one.
@@ -100,7 +99,7 @@ std::string conclusion(const Diffed &diffed) {
   }
   if (better + worse == 0) return text + "; no figure differs significantly";
   const auto counted = [](std::size_t count, const char *what) {
-    return fmt::format("{} figure{} {} {}", count, count == 1 ? "" : "s", count == 1 ? "is" : "are", what);
+    return fmt::format("{} {}", plural(count, "figure is", "figures are"), what);
   };
   return fmt::format("{}; {}, {}", text, counted(better, "better"), counted(worse, "worse"));
 }

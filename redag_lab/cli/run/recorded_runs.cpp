@@ -54,9 +54,6 @@ std::vector<std::string> labels_of(const std::vector<fs::path> &subjects) {
   return labels;
 }
 
-// Accepts this version and the previous one, which share the keys read here.
-bool is_comparison(const Json &format) { return format == "redag.comparison/2" || format == "redag.comparison/3"; }
-
 // Reads from a comparison the order of its runs, and its warnings.
 Result<void> read_comparison(const fs::path &file, std::vector<std::string> &order, std::vector<std::string> &notes) {
   std::error_code error;
@@ -66,7 +63,7 @@ Result<void> read_comparison(const fs::path &file, std::vector<std::string> &ord
   const auto bad = [&] { return trace::file_error(file.string(), 1, "the file was not written by 'redag compare'"); };
   if (json_is_too_large(*text)) return bad();
   const Json json = Json::parse(*text, nullptr, false);
-  if (!json.is_object() || !is_comparison(json.value("format", Json()))) return bad();
+  if (!json.is_object() || json.value("format", Json()) != "redag.comparison/3") return bad();
   for (const Json &executor : json.value("executors", Json::array())) {
     if (!executor.is_object() || !executor.contains("name") || !executor["name"].is_string()) return bad();
     order.push_back(executor["name"]);

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "redag/base/text.hpp"
+#include "redag/base/words.hpp"
 #include "redag_analysis/metrics/files/summary_json.hpp"
 #include "redag_analysis/metrics/verdict.hpp"
 #include "redag_analysis/text/table.hpp"
@@ -139,10 +140,9 @@ std::string headline(const lab::Session &session) {
   const trace::RunInfo &info = session.info;
   const bool simulated = info.driver == trace::Driver::Simulator;
   const std::string length = humanize_duration(info.end - info.start);
-  std::string text =
-      fmt::format("{}: {}, {}, {} worker{}, {}, seed {}\n", info.workload.name, info.executor,
-                  to_string(info.config.policy), info.config.workers, info.config.workers == 1 ? "" : "s",
-                  simulated ? "simulation of " + length : "run of " + length + " on threads", info.seed);
+  std::string text = fmt::format("{}: {}, {}, {}, {}, seed {}\n", info.workload.name, info.executor,
+                                 to_string(info.config.policy), plural(info.config.workers, "worker"),
+                                 simulated ? "simulation of " + length : "run of " + length + " on threads", info.seed);
   text += fmt::format("preemption: {}{}\n", info.preemption,
                       info.preemption_why.empty() ? "" : " (" + info.preemption_why + ")");
   if (!info.overheads.empty()) text += fmt::format("overheads: {}\n", info.overheads);
@@ -163,11 +163,9 @@ std::string describe_check(const metrics::CheckReport &check, const StreamTraits
     tested += fmt::format("; {} not made, because the rates of tasks changed later", format_count(check.not_judged));
   }
   if (check.ok()) return fmt::format("trace check: {}, {}\n", tinted("ok", Tint::Good, terminal.colour), tested);
-  return fmt::format(
-      "trace check: {}, {}\n{}",
-      tinted(fmt::format("{} violation{}", format_count(check.violation_count), check.violation_count == 1 ? "" : "s"),
-             Tint::Bad, terminal.colour),
-      tested, check.to_string());
+  return fmt::format("trace check: {}, {}\n{}",
+                     tinted(plural(check.violation_count, "violation"), Tint::Bad, terminal.colour), tested,
+                     check.to_string());
 }
 
 std::string describe(const lab::Session &session, const StreamTraits &terminal, const ReportOptions &options) {
@@ -199,8 +197,7 @@ std::string describe(const lab::Session &session, const StreamTraits &terminal, 
   }
   const metrics::HighModeTime &high = session.summary.high_mode;
   if (high.count > 0) {
-    text += fmt::format("HI mode: {} time{}, in total {}\n", format_count(high.count), high.count == 1 ? "" : "s",
-                        humanize_duration(high.total));
+    text += fmt::format("HI mode: {}, in total {}\n", plural(high.count, "time"), humanize_duration(high.total));
   }
   text += describe_check(session.check, terminal);
   if (session.cut_at) {

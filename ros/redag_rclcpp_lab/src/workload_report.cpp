@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "redag/base/text.hpp"
+#include "redag/base/words.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/output_file.hpp"
 #include "redag_analysis/metrics/files/run_files.hpp"
@@ -81,11 +82,10 @@ redag::Diagnostics write_results(const WorkloadRun &run, const std::string &fold
 
 std::string describe(const WorkloadRun &run) {
   const redag::trace::RunInfo &info = run.trace.info;
-  std::string text =
-      fmt::format("{}: {}, {} thread{}, {} as ROS 2 nodes, seed {}\npreemption: {}{}\n{}\n", info.workload.name,
-                  info.executor, info.workload.platform.workers, info.workload.platform.workers == 1 ? "" : "s",
-                  redag::humanize_duration(info.end - info.start), info.seed, info.preemption,
-                  info.preemption_why.empty() ? "" : " (" + info.preemption_why + ")", info.overheads);
+  std::string text = fmt::format("{}: {}, {}, {} as ROS 2 nodes, seed {}\npreemption: {}{}\n{}\n", info.workload.name,
+                                 info.executor, redag::plural(info.workload.platform.workers, "thread"),
+                                 redag::humanize_duration(info.end - info.start), info.seed, info.preemption,
+                                 info.preemption_why.empty() ? "" : " (" + info.preemption_why + ")", info.overheads);
   if (info.warm_up > 0)
     text += fmt::format("warm-up: the first {} are not counted\n", redag::humanize_duration(info.warm_up));
   if (run.stopped) text += "stopped early: the results cover only the time until then\n";

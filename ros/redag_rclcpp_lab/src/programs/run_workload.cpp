@@ -25,6 +25,7 @@
 #include "rclcpp/rclcpp.hpp"
 #include "redag/base/check.hpp"
 #include "redag/base/text.hpp"
+#include "redag/base/words.hpp"
 #include "redag/loader/workload_yaml.hpp"
 #include "redag/model/clusters.hpp"
 #include "redag/threads/threads.hpp"
@@ -224,8 +225,8 @@ int compare(const redag::Workload &workload, const Arguments &arguments, const s
     }
   }
   if (!results.empty()) {
-    fmt::print("{}: {} repetition{} of {} as ROS 2 nodes, {} transport, seed {}\n\n{}", workload.name, arguments.repeat,
-               arguments.repeat == 1 ? "" : "s", redag::humanize_duration(arguments.run.duration),
+    fmt::print("{}: {} of {} as ROS 2 nodes, {} transport, seed {}\n\n{}", workload.name,
+               redag::plural(arguments.repeat, "repetition"), redag::humanize_duration(arguments.run.duration),
                arguments.run.intra_process ? "intra-process" : "middleware", arguments.run.seed,
                comparison_table(workload, arguments.executors, results));
     fmt::print(
