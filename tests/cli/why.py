@@ -37,7 +37,7 @@ class Why(Case):
 
     def test_parts_sum_to_the_response(self):
         folder = self.simulated("--preemption", "none")
-        document = self.document(redag("why", folder, "--json"), "redag.why/1")
+        document = self.document(redag("why", folder, "--json", "--all"), "redag.why/1")
         self.assertGreater(document["misses"], 5)
         self.assertEqual(len(document["jobs"]), document["misses"])
         rows = {(row["dag"] + "." + row["task"] + "#" + row["job"]): row for row in self.jobs(folder)}
@@ -80,8 +80,24 @@ class Why(Case):
         self.assertIn("shorter parts, mainly ", short)
         self.assertIn("--all shows all", short)
         self.assertGreater(len(whole.splitlines()), 200)
-        document = json.loads(self.expect(redag("why", folder, "slow.t#0", "--json"), 0).stdout)
-        self.assertEqual(sum(part["length_ns"] for part in document["jobs"][0]["parts"]), document["jobs"][0]["length_ns"])
+        for more, least, most in ([], 20, 40), (["--all"], 200, 10_000):
+            job, = json.loads(self.expect(redag("why", folder, "slow.t#0", "--json", *more), 0).stdout)["jobs"]
+            self.assertTrue(least <= len(job["parts"]) <= most, len(job["parts"]))
+            self.assertEqual(sum(part["length_ns"] for part in job["parts"]), job["length_ns"])
+            for part in job["parts"]:
+                self.assertEqual(part["cause"] is None, "shorter parts" in part["text"], part)
+
+    def test_a_document_is_short_however_many_missed(self):
+        """Its size does not grow with the misses and their parts, of which there are some 100 000 here."""
+        file = self.write("missed.yaml", "platform: {workers: 1, preemption: os}\ndags:\n"
+                          "  - {name: a, tasks: [{name: t, wcet: 90us, period: 200us}]}\n"
+                          "  - {name: b, deadline: 100ms, tasks: [{name: t, wcet: 150ms, period: 400ms}]}\n")
+        folder = self.folder / "missed"
+        self.expect(redag("simulate", file, "--duration", "12s", "--out", folder), 0)
+        result = self.expect(redag("why", folder, "--json"), 0)
+        document = json.loads(result.stdout)
+        self.assertEqual((document["misses"], len(document["jobs"])), (30, 20))
+        self.assertLess(len(result.stdout), 400_000)
 
     def test_mistakes(self):
         folder = self.simulated()

@@ -7,8 +7,10 @@
 #include <charconv>
 #include <memory>
 #include <optional>
+#include <span>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "redag/base/nearest.hpp"
 #include "redag/base/text.hpp"
@@ -63,23 +65,12 @@ class Explaining {
   Result<int> explain_run(const metrics::Investigation &investigation) {
     const std::vector<metrics::Subject> subjects =
         investigation.misses().empty() ? investigation.closest(kClosest) : investigation.misses();
-    WhyOverview overview;
-    overview.missed = investigation.missed();
-    overview.late_end_to_end = investigation.late_end_to_end();
-    overview.jobs = investigation.counted();
-    overview.explained = subjects.size();
-    overview.explanations.resize(options_.all || options_.json ? subjects.size() : std::min(kRows, subjects.size()));
-    metrics::CulpritCount causes;
-    const Result<void> explained = investigation.explain(subjects, [&](std::size_t rank, metrics::Explanation one) {
-      causes.add(one);
-      if (rank < overview.explanations.size()) overview.explanations[rank] = std::move(one);
-    });
+    WhyOverview overview{.missed = investigation.missed(),
+                         .late_end_to_end = investigation.late_end_to_end(),
+                         .jobs = investigation.counted()};
+    const Result<void> explained = explain(investigation, subjects, overview);
     if (!explained) return tl::unexpected<Diagnostics>(explained.error());
-    overview.causes = causes.sorted();
-    if (options_.json) {
-      console_.print(to_text(to_json(overview, investigation.run())));
-      return kExitOk;
-    }
+    if (options_.json) return print(overview, investigation);
     console_.say(describe(overview, investigation.run(), console_.out_traits()));
     if (overview.explanations.empty()) return kExitOk;
     const metrics::JobRecord &worst = overview.explanations.front().job;
@@ -94,26 +85,33 @@ class Explaining {
     if (!*found) return kExitBad;
     metrics::Subject subject = **found;
     if (options_.end_to_end) subject.end_to_end = true;
-    WhyOverview overview;
-    overview.explanations.resize(1);
-    const Result<void> explained =
-        investigation.explain({&subject, 1}, [&](std::size_t /*index*/, metrics::Explanation explanation) {
-          overview.explanations.front() = std::move(explanation);
-        });
+    WhyOverview overview{.jobs = 1};
+    const Result<void> explained = explain(investigation, {&subject, 1}, overview);
     if (!explained) return tl::unexpected<Diagnostics>(explained.error());
     const metrics::Explanation &one = overview.explanations.front();
-    overview.explained = 1;
     overview.late_end_to_end = one.miss == metrics::Miss::EndToEnd ? 1 : 0;
     overview.missed = one.miss == metrics::Miss::None ? 0 : 1 - overview.late_end_to_end;
-    overview.jobs = 1;
+    if (options_.json) return print(overview, investigation);
+    console_.say(describe(one, investigation.run(), console_.out_traits(), most_parts_));
+    return kExitOk;
+  }
+
+  // Counts the causes of all these jobs, and keeps the explanations of those to be shown.
+  Result<void> explain(const metrics::Investigation &investigation, std::span<const metrics::Subject> subjects,
+                       WhyOverview &overview) {
+    overview.explained = subjects.size();
+    overview.explanations.resize(options_.all ? subjects.size() : std::min(kRows, subjects.size()));
     metrics::CulpritCount causes;
-    causes.add(one);
+    Result<void> explained = investigation.explain(subjects, [&](std::size_t rank, metrics::Explanation one) {
+      causes.add(one);
+      if (rank < overview.explanations.size()) overview.explanations[rank] = std::move(one);
+    });
     overview.causes = causes.sorted();
-    if (options_.json) {
-      console_.print(to_text(to_json(overview, investigation.run())));
-    } else {
-      console_.say(describe(one, investigation.run(), console_.out_traits(), options_.all ? 0 : kParts));
-    }
+    return explained;
+  }
+
+  int print(const WhyOverview &overview, const metrics::Investigation &investigation) {
+    console_.print(to_text(to_json(overview, investigation.run(), most_parts_)));
     return kExitOk;
   }
 
@@ -152,6 +150,7 @@ class Explaining {
 
   const WhyOptions &options_;
   Console &console_;
+  const std::size_t most_parts_ = options_.all ? 0 : kParts;
 };
 
 }  // namespace

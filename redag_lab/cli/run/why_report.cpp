@@ -95,16 +95,19 @@ std::string headline_of(const WhyOverview &overview) {
   return text;
 }
 
+std::vector<metrics::PartRow> rows_of(const Explanation &one, std::size_t most) {
+  return metrics::rows_of(one.parts, most == 0 ? one.parts.size() : most);
+}
+
 Json json_of(const Culprit &cause, const trace::RunInfo &run) {
   const Workload &workload = run.workload;
-  Json row{{"cause", to_string(cause.cause)},
-           {"task", cause.task.valid() ? Json(trace::task_name(workload, cause.task)) : Json()},
-           {"text", metrics::describe(cause, workload)},
-           {"remedy", or_null(metrics::remedy(cause, run))},
-           {"jobs", cause.jobs},
-           {"main", cause.main},
-           {"time_ns", cause.time}};
-  return row;
+  return Json{{"cause", to_string(cause.cause)},
+              {"task", cause.task.valid() ? Json(trace::task_name(workload, cause.task)) : Json()},
+              {"text", metrics::describe(cause, workload)},
+              {"remedy", or_null(metrics::remedy(cause, run))},
+              {"jobs", cause.jobs},
+              {"main", cause.main},
+              {"time_ns", cause.time}};
 }
 
 Json json_of(const std::optional<metrics::MainCause> &main, const trace::RunInfo &run) {
@@ -115,16 +118,18 @@ Json json_of(const std::optional<metrics::MainCause> &main, const trace::RunInfo
               {"remedy", or_null(metrics::remedy(*main, run))}};
 }
 
-Json json_of(const Explanation &one, const trace::RunInfo &run) {
+Json json_of(const Explanation &one, const trace::RunInfo &run, std::size_t most) {
   const auto name = [&](const JobId &job) { return job.valid() ? Json(metrics::job_name(run.workload, job)) : Json(); };
   Json parts = Json::array();
-  for (const Part &part : one.parts) {
-    parts.push_back(Json{{"cause", to_string(part.cause)},
-                         {"job", name(part.job)},
-                         {"by", name(part.by)},
-                         {"begin_ns", part.begin == kNever ? Json() : Json(part.begin)},
-                         {"length_ns", part.length},
-                         {"text", metrics::describe(part, run.workload, id_of(one))}});
+  for (const metrics::PartRow &row : rows_of(one, most)) {
+    const Part &first = row.parts.front();
+    const bool is_one = row.parts.size() == 1;
+    parts.push_back(Json{{"cause", is_one ? Json(to_string(first.cause)) : Json()},
+                         {"job", is_one ? name(first.job) : Json()},
+                         {"by", is_one ? name(first.by) : Json()},
+                         {"begin_ns", row.begin() == kNever ? Json() : Json(row.begin())},
+                         {"length_ns", row.length()},
+                         {"text", metrics::describe(row, run.workload, id_of(one))}});
   }
   return Json{{"job", name(id_of(one))},
               {"text", metrics::headline(one, run.workload)},
@@ -144,7 +149,7 @@ std::string describe(const Explanation &one, const trace::RunInfo &run, const St
   std::string text = tinted(metrics::headline(one, run.workload), tint_of(one), terminal.colour) + "\n\n";
   text += fmt::format("{:>10}  {:>15}  {:>7}  what happened\n", one.end_to_end ? "origin +" : "release +",
                       "nanoseconds", "share");
-  for (const metrics::PartRow &row : metrics::rows_of(one.parts, most == 0 ? one.parts.size() : most)) {
+  for (const metrics::PartRow &row : rows_of(one, most)) {
     text += line(row.begin() == kNever ? "" : humanize_duration(row.begin() - one.begin), row.length(), one.length(),
                  metrics::describe(row, run.workload, id_of(one)), terminal);
   }
@@ -191,11 +196,11 @@ std::string describe(const WhyOverview &overview, const trace::RunInfo &run, con
   return text;
 }
 
-Json to_json(const WhyOverview &overview, const trace::RunInfo &run) {
+Json to_json(const WhyOverview &overview, const trace::RunInfo &run, std::size_t most) {
   Json causes = Json::array();
   for (const Culprit &cause : overview.causes) causes.push_back(json_of(cause, run));
   Json jobs = Json::array();
-  for (const Explanation &one : overview.explanations) jobs.push_back(json_of(one, run));
+  for (const Explanation &one : overview.explanations) jobs.push_back(json_of(one, run, most));
   return Json{{"format", "redag.why/1"},
               {"workload", run.workload.name},
               {"executor", run.executor},

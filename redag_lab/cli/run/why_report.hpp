@@ -16,8 +16,8 @@ namespace redag::cli {
 
 /// The explanations of a whole run: of its misses, or without any of the jobs closest to their deadlines.
 struct WhyOverview {
-  std::vector<metrics::Explanation> explanations;  // to be shown; the worst first
-  std::vector<metrics::Culprit> causes;            // of all that were explained
+  std::vector<metrics::Explanation> explanations{};  // to be shown; the worst first
+  std::vector<metrics::Culprit> causes{};            // of all that were explained
   std::size_t explained = 0;
   std::uint64_t missed = 0;           // late or lost
   std::uint64_t late_end_to_end = 0;  // others, which missed only the end-to-end deadline of their DAG
@@ -35,7 +35,7 @@ struct WhyOverview {
 [[nodiscard]] std::string describe(const WhyOverview &overview, const trace::RunInfo &run,
                                    const StreamTraits &terminal);
 
-/// Returns the document "redag.why/1" (docs/why.md).
-[[nodiscard]] Json to_json(const WhyOverview &overview, const trace::RunInfo &run);
+/// Returns the document "redag.why/1" (docs/why.md), with at most `most` parts of each job (0: all).
+[[nodiscard]] Json to_json(const WhyOverview &overview, const trace::RunInfo &run, std::size_t most);
 
 }  // namespace redag::cli
