@@ -253,6 +253,12 @@ dags:
         explained = json.loads(redag("analyze", self.cart, "--json", "--explain", "slow").stdout)
         self.assertEqual(explained["explanation"]["name"], "slow")
 
+    def test_an_option_that_takes_the_file_for_its_value(self):
+        for option in "--explain", "--chain", "--method":
+            self.expect(redag("analyze", option, self.cart), 2,
+                        f"FILE is required, and {option} has taken '{self.cart}' as its value")
+        self.expect(redag("simulate", "--out", self.cart), 2, f"and --out has taken '{self.cart}'")
+
     def test_bad_input(self):
         self.expect(redag("analyze"), 2, "FILE is required")
         self.expect(redag("analyze", self.write("bad.yaml", MISTAKEN)), 2, "did you mean 'wcet'?")

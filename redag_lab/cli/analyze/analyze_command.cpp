@@ -225,18 +225,13 @@ Result<Parts> analyse_configured(const Workload &workload, const AnalyzeOptions 
 }
 
 int analyze_file(const AnalyzeOptions &options, Console &console) {
-  if (options.analysis.run.file.empty()) {
-    const bool wants_file = !options.explain.empty() || !options.chains.empty() || options.sensitivity;
-    if (options.methods && !wants_file) {
-      if (options.analysis.run.json) {
-        console.print(to_text(methods_json()));
-      } else {
-        console.say(describe_methods());
-      }
-      return kExitOk;
+  if (options.analysis.run.file.empty()) {  // with --methods
+    if (options.analysis.run.json) {
+      console.print(to_text(methods_json()));
+    } else {
+      console.say(describe_methods());
     }
-    console.error("FILE is required", "only --methods works without it, alone or with --json");
-    return kExitBad;
+    return kExitOk;
   }
   const char *ours = !options.chains.empty() ? "--chain" : options.sensitivity ? "--sensitivity" : nullptr;
   if (ours != nullptr && options.executor != "redag") {
@@ -282,7 +277,7 @@ Action add_analyze(CLI::App &app) {
       ->take_all()
       ->allow_extra_args(false);
   app.add_flag("--sensitivity", options->sensitivity,
-               "Show how far each execution time and rate can grow, or must shrink, to have every deadline shown");
+               "Show how far each execution time can grow, or must shrink, to have every deadline shown");
   app.add_flag("--all", options->all,
                "Show all tasks and DAGs, the result of each method, and the methods that do not apply");
   add_count(app, "--effort", options->analysis.effort, {0, kMostEffort},
@@ -290,6 +285,10 @@ Action add_analyze(CLI::App &app) {
       ->group("Limits");
   add_analysis_arguments(app, options->analysis,
                          "Exit with status 1 unless a sound method shows that every deadline is met");
+  app.callback([options] {
+    const bool wants_file = !options->explain.empty() || !options->chains.empty() || options->sensitivity;
+    if (options->analysis.run.file.empty() && (!options->methods || wants_file)) throw CLI::RequiredError("FILE");
+  });
   return [options](Console &console) { return analyze_file(*options, console); };
 }
 

@@ -9,7 +9,9 @@
 #include <algorithm>
 #include <array>
 #include <exception>
+#include <filesystem>
 #include <new>
+#include <system_error>
 
 #include "redag/base/text.hpp"
 #include "redag/loader/provenance.hpp"
@@ -131,23 +133,35 @@ std::string mismatch(const CLI::ArgumentMismatch &error) {
 // accepts one.
 std::string find_empty(const CLI::App &command) {
   for (const CLI::Option *option : command.get_options()) {
-    for (const std::string &value : option->results()) {
-      if (value.empty()) return option->get_name();
-    }
+    const auto &values = option->results();
+    if (std::find(values.begin(), values.end(), "") != values.end()) return option->get_name();
   }
   return {};
 }
 
-int usage_error(Console &console, const std::string &message, const std::string &command) {
-  console.error(message);
-  console.note(fmt::format("run 'redag {}--help' for the usage\n", command.empty() ? "" : command + " "));
-  return kExitBad;
+// Returns what is missing, and which option has taken a file that exists for its value: "--explain robot.yaml".
+std::string missing(const CLI::RequiredError &error, const CLI::App &command) {
+  for (const CLI::Option *option : command.get_options([](const CLI::Option *one) { return !one->get_positional(); })) {
+    for (const std::string &value : option->results()) {
+      std::error_code ignored;
+      if (!std::filesystem::is_regular_file(value, ignored)) continue;
+      return fmt::format("{}, and {} has taken {} as its value", error.what(), option->get_name(), in_quotes(value));
+    }
+  }
+  return error.what();
 }
 
-// Returns the command on the command line, or null.
-CLI::App *chosen(const CLI::App &app) {
+// Returns the command on the command line, or the program itself.
+const CLI::App &chosen(const CLI::App &app) {
   const auto parsed = app.get_subcommands();
-  return parsed.empty() ? nullptr : parsed.front();
+  return parsed.empty() ? app : *parsed.front();
+}
+
+int usage_error(Console &console, const std::string &message, const CLI::App &command) {
+  const bool is_program = command.get_parent() == nullptr;
+  console.error(message);
+  console.note(fmt::format("run 'redag {}--help' for the usage\n", is_program ? "" : command.get_name() + " "));
+  return kExitBad;
 }
 
 // Returns the arguments with "help COMMAND" as "COMMAND --help", and "version" as "--version".
@@ -188,47 +202,40 @@ int parse_and_run(const std::vector<std::string> &given, Console &console) {
   const std::vector<std::string> names = command_names();
   const std::string &first = arguments.front();
   if (first.empty() || (first.front() != '-' && std::find(names.begin(), names.end(), first) == names.end())) {
-    return usage_error(console, fmt::format("unknown command {} ({})", in_quotes(first), suggestion(first, names)), "");
+    return usage_error(console, fmt::format("unknown command {} ({})", in_quotes(first), suggestion(first, names)),
+                       app);
   }
 
-  for (const std::string &argument :
-       arguments) {  // CLI11 takes it for an option without a value, where it may have none
+  for (const std::string &argument : arguments) {  // CLI11 takes it for an option without a value
     if (argument.size() > 3 && argument.compare(0, 2, "--") == 0 && argument.find('=') == argument.size() - 1) {
       return usage_error(console, argument.substr(0, argument.size() - 1) + ": the value is empty",
-                         first.front() == '-' ? "" : first);
+                         first.front() == '-' ? app : *app.get_subcommand(first));
     }
   }
-  const CLI::App *command = nullptr;
-  const auto fail = [&](const std::string &message) {
-    return usage_error(console, message, command == nullptr ? "" : command->get_name());
-  };
   try {
     app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // CLI11 expects the last argument first
-    command = chosen(app);
   } catch (const CLI::CallForHelp &) {
-    command = chosen(app);
-    console.print(command != nullptr ? command->help("redag") : app.help());
+    console.print(&chosen(app) == &app ? app.help() : chosen(app).help("redag"));
     return kExitOk;
   } catch (const CLI::CallForVersion &version) {
     console.print(std::string(version.what()) + "\n");
     return kExitOk;
   } catch (const CLI::ExtrasError &) {
-    command = chosen(app);
-    return fail(unknown_argument(command != nullptr ? *command : app));
+    return usage_error(console, unknown_argument(chosen(app)), chosen(app));
   } catch (const CLI::ArgumentMismatch &error) {
-    command = chosen(app);
-    return fail(mismatch(error));
+    return usage_error(console, mismatch(error), chosen(app));
+  } catch (const CLI::RequiredError &error) {
+    return usage_error(console, missing(error, chosen(app)), chosen(app));
   } catch (const CLI::ParseError &error) {
-    command = chosen(app);
-    return fail(error.what());
+    return usage_error(console, error.what(), chosen(app));
   }
-  if (command != nullptr) {
-    if (const std::string option = find_empty(*command); !option.empty()) return fail(option + ": the value is empty");
+  if (const std::string option = find_empty(chosen(app)); !option.empty()) {
+    return usage_error(console, option + ": the value is empty", chosen(app));
   }
-  for (const auto &[own, action] : actions) {
-    if (own == command) return action(console);
+  for (const auto &[command, action] : actions) {
+    if (command == &chosen(app)) return action(console);
   }
-  return usage_error(console, "no command is given", "");
+  return usage_error(console, "no command is given", app);
 }
 
 }  // namespace
