@@ -5,7 +5,7 @@
 """Tests that every screen and file of a run counts the same jobs: released, finished, late, skipped, missed.
 
 Random workloads lose jobs in all ways. An independent count of jobs.csv, by the words of docs/model.md, is compared
-with the text and the JSON of `simulate`, with summary.json, and with the documents of `report` and `why`.
+with the text and the JSON of `simulate` and `compare`, with summary.json, and with the documents of `report` and `why`.
 
 Usage: counts.py PROGRAM SOURCE_DIR. Uses the standard library only.
 """
@@ -136,6 +136,24 @@ class Counts(Case):
         self.assertEqual([picked(dag["jobs"]) for dag in group["dags"]], [picked(dag) for dag in summary["dags"]])
         self.assertEqual([picked(task["jobs"]) for task in group["tasks"]], [picked(task) for task in summary["tasks"]])
         self.assertEqual([dag["end_to_end"]["late"] for dag in group["dags"]], [dag["end_to_end"]["late"] for dag in summary["dags"]])
+
+        # compare, on the screen and as a document, and its report: all repetitions together
+        many = self.folder / f"compared{seed}"
+        screen = self.expect(redag("compare", file, "--simulate", "--executors", "redag,mte", "--repeat", "2", *options, "--out", many), 0).stdout
+        comparison = json.loads((many / "comparison.json").read_text())
+        page = json.loads(self.expect(redag("report", many, "--json"), 0).stdout)
+        screen_rows = {}
+        for line in screen.splitlines():
+            if row := re.match(r"(?:(d\d|total) +| {4,})(redag|mte) +(\d.*)$", line):
+                name = row[1] or name
+                screen_rows[name, row[2]] = [number(re.match(r"[\d ]+", cell).group()) for cell in re.split(r"  +", row[3])[:3]]
+        for executor, its_group in zip(comparison["executors"], page["groups"]):
+            runs = [json.loads(path.read_text()) for path in sorted(many.glob(executor["name"] + "/repetition-*/summary.json"))]
+            for dag, shown_dag, *each in zip(executor["dags"], its_group["dags"], *(run["dags"] for run in runs)):
+                own = [sum(run[key] for run in each) for key in ("released", "late", "missed")]
+                for figures in dag, shown_dag["jobs"]:
+                    self.assertEqual([figures[key] for key in ("released", "late", "missed")], own)
+                self.assertEqual(screen_rows[dag["name"], executor["name"]], own, screen)
 
         # why
         why = json.loads(self.expect(redag("why", folder, "--json"), 0).stdout)

@@ -72,7 +72,7 @@ class Top(Case):
         later = self.frame_of(process, lambda f: f["sequence"] > frame["sequence"])
         self.assertGreater(later["up_ns"], frame["up_ns"])
         self.assertEqual(self.page(process).stat().st_mode & 0o7777, 0o600)
-        self.expect(redag("top", "--list"), 0)
+        self.assertRegex(self.expect(redag("top", "--list"), 0).stdout, r"(?m)^ *pid .* jobs +missed ")
         listed = {e["pid"]: e for e in json.loads(redag("top", "--list", "--json").stdout)["executors"]}
         self.assertEqual(listed[process.pid]["name"], "cart")
 
@@ -80,6 +80,11 @@ class Top(Case):
         self.assertIn("cart  redag", text)
         for column in ["rate/s", "p99", "deadline", "bound", "missed", "active"]:
             self.assertIn(column, text)
+        # docs/live_page.md shows the same columns.
+        picture = (SOURCE / "docs" / "images" / "top.svg").read_text(encoding="utf-8")
+        head = re.search(r'y="([\d.]+)"[^>]*>task<', picture)[1]
+        self.assertEqual(re.findall(rf'y="{head}"[^>]*>([^<]+)<', picture),
+                         next(line for line in text.splitlines() if line.startswith("task ")).split())
         piped = self.expect(redag("top", process.pid), 0, "not a terminal")
         self.assertIn("plan", piped.stdout)
         self.assertNotIn("\033", piped.stdout)

@@ -5,9 +5,15 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
 
+#include <fmt/format.h>
+
+#include "redag/base/text.hpp"
+#include "redag_lab/cli/serve/metrics.hpp"
 #include "redag_lab/cli/top/attachment.hpp"
 #include "redag_lab/cli/top/live_json.hpp"
+#include "redag_lab/cli/top/live_table.hpp"
 #include "tests/testing/live_frame.hpp"
 
 namespace redag::cli {
@@ -36,6 +42,41 @@ std::vector<live::Listed> machine() {
   pages[1].page->frame.tasks[1].priority = 78;
   pages[1].page->frame.tasks[2].priority = 77;
   return pages;
+}
+
+// An executor in overload releases far more jobs than it finishes.
+RC_GTEST_PROP(LiveScreens, CountTheSameJobs, (std::uint16_t finished, std::uint16_t late, std::uint16_t skipped)) {
+  live::Listed one = small_page();
+  live::Frame &frame = one.page->frame;
+  live::page::Figures figures;
+  figures.finished = std::uint64_t{finished} + late;
+  figures.skipped = skipped;
+  figures.released = figures.finished + skipped + 1;
+  figures.misses = std::uint64_t{late} + skipped;
+  frame.dags = {{.name = "slow", .figures = figures}};
+  frame.tasks = {{.name = "plan", .figures = figures}};
+
+  const std::string released = format_count(figures.released);
+  const std::string missed = format_count(figures.misses);
+  const std::string list = executor_table({one}, frame.published).lines(0, false).back();
+  RC_ASSERT(list.find(fmt::format("  1  {:>4}  {:>6}  ", released, missed)) != std::string::npos);
+  const std::string headline = misses_in_words(total_of(frame), frame.window);
+  const std::string jobs = released + (figures.released == 1 ? " job" : " jobs");
+  RC_ASSERT(headline.rfind(
+                figures.misses == 0 ? "no deadline missed, of " + jobs : fmt::format("missed {} of {}, ", missed, jobs),
+                0) == 0);
+  const Json document = to_json(one, *one.page, frame.published);
+  for (const char *rows : {"dags", "tasks"}) {
+    const Json &row = document[rows][0];
+    RC_ASSERT(row["released"] == figures.released && row["misses"] == figures.misses);
+  }
+  const std::string metrics = metrics_text({one}, frame.published);
+  for (const auto &[name, value] : {std::pair("redag_jobs_released_total", figures.released),
+                                    std::pair("redag_deadline_misses_total", figures.misses)}) {
+    const std::size_t at = metrics.find(fmt::format("\n{}{{", name));
+    RC_ASSERT(metrics.substr(metrics.find("} ", at), fmt::format("}} {}\n", value).size()) ==
+              fmt::format("}} {}\n", value));
+  }
 }
 
 TEST(LiveRows, Orders) {

@@ -111,7 +111,7 @@ Table executor_table(const std::vector<live::Listed> &pages, Time now) {
                {"driver", false, 4},
                {"tasks", true, 3},
                {"jobs", true, 2},
-               {"misses", true, 5},
+               {"missed", true, 5},
                {"up", true, 1},
                {"state", false, 7}});
   for (const live::Listed &listed : pages) {
@@ -127,7 +127,7 @@ Table executor_table(const std::vector<live::Listed> &pages, Time now) {
                {frame.program},
                {frame.driver},
                {format_count(frame.tasks.size())},
-               {format_count(total.finished)},
+               {format_count(total.released)},
                {format_count(total.misses), total.misses > 0 ? Tint::Bad : Tint::Faint},
                {humanize_duration(frame.published - frame.began)},
                late ? Cell{"no update for " + humanize_duration(*late), Tint::Bad} : Cell{"running", Tint::Good}});
