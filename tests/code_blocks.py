@@ -2,7 +2,7 @@
 # SPDX-FileCopyrightText: The ReDAG-RT developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Executes the code blocks of README.md, docs/*.md and docs/tutorials/*.md, as a reader would.
+"""Executes the code blocks of README.md, of all pages below docs, and of every folder's README.md, as a reader would.
 
 Usage: code_blocks.py PROGRAM SOURCE_DIR BUILD_DIR CXX CMAKE [PAGE...]
 
@@ -17,7 +17,8 @@ is in PATH, and the build is installed where CMake and pkg-config find it. By la
     xml       is well-formed
     diff, sql, text and blocks without a language are no code
 
-A comment before a block changes that. "not run" blocks are counted, with their reasons, and sh is still parsed:
+A comment before a block changes that. "not run" blocks are counted, with their reasons. Their commands are still parsed,
+and what they name has to exist: options of redag, files, programs and parameters of ROS 2, variables, and tests.
 
     <!-- not run: REASON -->
     <!-- run with: TEXT = OTHER -->          another text in the place of one, for example a shorter time
@@ -153,6 +154,42 @@ class Page:
             if not any(word in text for word in wanted):
                 raise Wrong(f"the reason names {name}, which runs none of {', '.join(sorted(wanted))}")
 
+    def is_written(self, pattern, folders=("redag", "redag_analysis", "redag_lab", "ros", "tests")):
+        """True if a source in these folders has this text (a regular expression)."""
+        where = [self.tools.source / folder for folder in folders]
+        return subprocess.run(["grep", "-rqsE", "--include=*.[ch]pp", "--", pattern, *where], check=False).returncode == 0
+
+    def look_up(self, text):
+        """Fails if commands name something that is not there."""
+        def wanted(is_there, what):
+            if not is_there:
+                raise Wrong(f"the block is not run, and names {what}, which is not there")
+
+        source = self.tools.source
+        for line in text.replace("\\\n", " ").splitlines():
+            words = shlex.split(line.removeprefix("$ "), comments=True)
+            for at, word in enumerate(words):
+                if word.startswith("redag "):  # in quotes
+                    self.look_up(word)
+                elif re.match(r"(tools|tests|workloads|evaluation|examples)/", word):
+                    wanted((source / word).exists(), word)
+                elif variable := re.match(r"(REDAG_\w+)=", word):
+                    wanted(self.is_written(f'"{variable[1]}"'), variable[1])
+                elif suite := re.match(r"--gtest_filter=(\w+)\.", word):
+                    wanted(self.is_written(rf"^\w*(TEST|PROP)\w*\({suite[1]}\b"), suite[1])
+                elif words[:1] == ["ros2"] and word in ("run", "launch") and words[at + 1].startswith("redag_"):
+                    folder, program = source / "ros" / words[at + 1], words[at + 2]
+                    built = (folder / "CMakeLists.txt").read_text(encoding="utf-8")
+                    wanted(re.search(rf"\b{program}\b", built) or (folder / "launch" / program).exists(), program)
+                elif word == "-p" and ":=" in words[at + 1]:
+                    wanted(self.is_written(f'"{words[at + 1].split(":=")[0]}"', ["ros/redag_rclcpp/src"]), words[at + 1])
+                elif word == "redag" and at + 1 < len(words) and re.fullmatch(r"[a-z]+", words[at + 1]):
+                    help_text = self.call(f"redag help {words[at + 1]}")
+                    end = next((i for i in range(at, len(words)) if words[i] in ("|", "&&", ";")), len(words))
+                    for option in words[at + 2:end]:
+                        name = option.split("=")[0]
+                        wanted(not name.startswith("--") or re.search(rf"{name}\b(?!-)", help_text), f"{name} of redag {words[at + 1]}")
+
     def execute(self, block):
         """Returns what was done with the block."""
         if block.language in NO_CODE:
@@ -163,6 +200,8 @@ class Page:
             self.confirm(block)
             if block.language == "sh":
                 self.call('bash -n <<< "$1"', arguments=[block.text.replace("<this repository>", "repository")])
+            if block.language in ("sh", "console"):
+                self.look_up(block.text)
             return "not run"
         if block.language == "cpp" and "rclcpp" in block.text and not self.tools.ros:
             block.marks["not run"] = "there is no ROS 2 under /opt/ros"
@@ -199,8 +238,9 @@ def main():
     if len(sys.argv) < 6:
         sys.exit(__doc__)
     program, source, build = (pathlib.Path(argument).resolve() for argument in sys.argv[1:4])
-    pages = sys.argv[6:] or ["README.md", *(str(page.relative_to(source)) for page in
-                                            sorted([*source.glob("docs/*.md"), *source.glob("docs/tutorials/*.md")]))]
+    folders = ["*", "ros/*", "examples/*", "tests/*", "evaluation/*"]
+    pages = sys.argv[6:] or [str(page.relative_to(source)) for page in sorted(
+        {*source.glob("*.md"), *source.glob("docs/**/*.md"), *(page for each in folders for page in source.glob(each + "/README.md"))})]
     counts, reasons, failures = collections.Counter(), [], 0
     with tempfile.TemporaryDirectory() as name:
         tools = Tools(program, source, build, *sys.argv[4:6], pathlib.Path(name))
