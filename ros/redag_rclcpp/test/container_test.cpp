@@ -212,7 +212,9 @@ TEST_F(ContainerTest, ArgumentsOfRclcppsContainerAreAccepted) {
   };
   EXPECT_EQ(workers_with({"--executor-type", "single-threaded", "--isolated", "--nonsense"}), 1);
   EXPECT_THAT(text(), AllOf(HasSubstr("--isolated has no effect"), HasSubstr("'--nonsense' is not known")));
-  EXPECT_EQ(workers_with({"--executor-type", "multi-threaded", "--ros-args", "-p", "thread_num:=1"}), 1);
+  EXPECT_EQ(workers_with({"--executor-type", "multi-threaded", "--ros-args", "-p", "thread_num:=1", "-p", "wrkers:=2"}),
+            1);
+  EXPECT_THAT(text(), HasSubstr("'wrkers' is not known"));
   EXPECT_EQ(workers_with({"--executor-type", "events-cbg", "--ros-args", "-p", "workers:=3"}), 3);
   EXPECT_THAT(text(), Not(HasSubstr("not known")));
 }
