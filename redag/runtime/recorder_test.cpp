@@ -141,6 +141,39 @@ TEST_F(Record, ADagIsRemovedWhileAPredecessorRuns) {
   EXPECT_EQ(recorded.info.removals.size(), 2U);
 }
 
+// Rates that do not fit into the levels of the kernel are added. Two tasks that had levels of their own share one then.
+TEST_F(Record, LevelsThatAreSharedLaterMakeNoViolation) {
+  {
+    Executor executor(recording(PreemptionMode::Auto));
+    if (executor.mode().mode != PreemptionMode::Os) GTEST_SKIP() << "SCHED_FIFO is not to be had here";
+    const auto compute = [](Duration time) {
+      for (const Time end = thread_cpu_now() + time; thread_cpu_now() < end;) {
+      }
+    };
+    std::atomic<int> jobs{0};
+    DagBuilder first("first");
+    first.timer("a", 10ms, [&] {
+      compute(200 * kMicrosecond);
+      ++jobs;
+    });
+    first.timer("b", 11ms, [&] { compute(4 * kMillisecond); });
+    executor.add(std::move(first));
+    executor.start();
+    while (jobs < 25) std::this_thread::sleep_for(1ms);
+    for (int i = 0; i < 160; ++i) {
+      DagBuilder more("more" + std::to_string(i));
+      more.timer("x", i < 120 ? std::chrono::microseconds(9'000'000 - i * 1000) : std::chrono::microseconds(9'990 - i),
+                 [] {});
+      executor.add(std::move(more));
+    }
+    executor.stop();
+  }
+  trace::Trace recorded = trace();
+  testing::expect_right(recorded);
+  recorded.info.settled.reset();
+  EXPECT_FALSE(metrics::check_trace(recorded, metrics::rules_for(recorded.info)).ok()) << "no job was preempted";
+}
+
 TEST_F(Record, AnEarlierRunIsReplacedAndAnUnfinishedOneIsMovedAside) {
   const auto run = [&] {
     Executor executor(recording());
