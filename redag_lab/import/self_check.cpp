@@ -53,7 +53,7 @@ Result<SelfCheck> check_against_recording(const ImportedWorkload &imported) {
   const Replayed replayed = replay(imported, imported.workload);
   SelfCheck check;
   check.executor = imported.workload.platform.workers > 1 ? "mte" : "ste";
-  check.noise = imported.wake_ups.p50;
+  check.noise = imported.wake_ups;
   const Result<Session> session =
       run_session(replayed.workload, Variant{check.executor, check.executor, {}, false}, replayed.options);
   if (!session) return tl::unexpected(session.error());
@@ -63,8 +63,9 @@ Result<SelfCheck> check_against_recording(const ImportedWorkload &imported) {
     if (recorded.count == 0 || simulated.count == 0) {
       check.unknown.push_back(task.name);
     } else {
-      check.tasks.push_back({task.task, task.name, recorded, simulated, error(recorded.p50, simulated.p50, check.noise),
-                             error(recorded.p99, simulated.p99, check.noise)});
+      check.tasks.push_back({task.task, task.name, recorded, simulated,
+                             error(recorded.p50, simulated.p50, check.noise.p50),
+                             error(recorded.p99, simulated.p99, check.noise.p99)});
     }
   }
   return check;

@@ -33,7 +33,7 @@ struct SelfCheck {
   std::string executor;  // whose model ran
   std::vector<ReproducedTask> tasks;
   std::vector<std::string> unknown;  // tasks whose responses were not recorded
-  Duration noise = 0;                // half of the wake-ups of idle threads take longer: smaller differences are none
+  metrics::Distribution noise;       // wake-ups of idle threads: a difference of p50 or p99 below theirs is none
 
   [[nodiscard]] bool is_reproduced() const;  // all of `tasks` are
 };

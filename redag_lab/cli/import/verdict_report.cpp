@@ -108,10 +108,10 @@ std::string describe(const lab::SelfCheck &check, const StreamTraits &terminal) 
   }
   std::string text = table.render(terminal.width, terminal.colour);
   text += fmt::format(
-      "The model of {} reproduces {} of {}: p50 within 10 %, p99 within 25 %, or {}, in which an idle thread of the "
-      "recording wakes up. Trust no comparison of the others.\n",
+      "The model of {} reproduces {} of {}: p50 within 10 % or {}, p99 within 25 % or {}. An idle thread of the "
+      "recording wakes up that late (median, 99 %). Trust no comparison of the others.\n",
       check.executor, check.tasks.size() - wrong, plural(check.tasks.size(), "recorded response"),
-      humanize_duration(check.noise));
+      humanize_duration(check.noise.p50), humanize_duration(check.noise.p99));
   if (!check.unknown.empty()) {
     text += fmt::format("unknown: when jobs of {} were released\n", join_first(check.unknown, 5));
   }
