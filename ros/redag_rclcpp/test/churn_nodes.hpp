@@ -164,9 +164,11 @@ class Churn {
   }
 
   void add_timer(const std::shared_ptr<Patch> &patch) {
-    const std::chrono::milliseconds period(2 + below(patch->random, 20));
-    // One timer in eight computes for longer than its period.
-    const std::chrono::microseconds longest = below(patch->random, 8) == 0 ? period * 3 / 2 : 200us;
+    // One timer in eight computes for longer than its period. It is less urgent than the node that stays: two of them
+    // take both workers, for as long as their nodes live.
+    const bool overloads = below(patch->random, 8) == 0;
+    const std::chrono::milliseconds period((overloads ? 5 : 2) + below(patch->random, 20));
+    const std::chrono::microseconds longest = overloads ? period * 3 / 2 : 200us;
     std::weak_ptr<Patch> weak = patch;
     patch->timers.push_back(patch->node->create_wall_timer(
         period, [this, weak, longest] { run(weak, longest); }, group(*patch)));
