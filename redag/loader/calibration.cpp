@@ -166,17 +166,14 @@ std::string to_yaml(const Calibration &calibration) {
 }
 
 Result<Calibration> parse_calibration(std::string_view text, std::string file_name) {
-  if (text.size() > kMaxBytes) {
-    return tl::unexpected<Diagnostics>(
-        Diagnostics{Diagnostic{Severity::Error, file_name, 0, 0, "too large for an overheads file", {}}});
-  }
+  if (text.size() > kMaxBytes) return file_error(file_name, 0, "too large for an overheads file");
   const Result<Node> root = yaml::parse(text, file_name);
   if (!root) return tl::unexpected<Diagnostics>(root.error());
   return OverheadsReader(*root, std::move(file_name)).run();
 }
 
 Result<Calibration> load_calibration(const std::filesystem::path &path) {
-  const Result<std::string> text = read_text_file(path, "an overheads file", kMaxBytes);
+  const Result<std::string> text = read_file(path.string(), kMaxBytes);
   if (!text) return tl::unexpected<Diagnostics>(text.error());
   return parse_calibration(*text, path.string());
 }

@@ -100,7 +100,7 @@ TEST(Calibration, BadFiles) {
   EXPECT_THAT(mistakes("overheads: {normal: {timer: 0, dispatch: 0, preempt: 0, lateness: 0, stall: 0, "
                        "stall_per_second: 1s, noise: 0, noise_per_second: 0, clock: 0}}"),
               HasSubstr("must be below one second per second"));
-  EXPECT_THAT(to_string(load_calibration("/").error()), HasSubstr("not an overheads file"));
+  EXPECT_THAT(to_string(load_calibration("/").error()), HasSubstr("is a directory, not a file"));
   EXPECT_THAT(to_string(load_calibration("/no/such/file").error()), HasSubstr("cannot open"));
 }
 

@@ -609,13 +609,7 @@ class Reader : private yaml::ValueReader {
 
 Result<LoadedWorkload> parse_workload(std::string_view text, std::string file_name, LoadOptions options) {
   if (text.size() > kMaxWorkloadBytes) {
-    return tl::unexpected<Diagnostics>(
-        Diagnostics{Diagnostic{Severity::Error,
-                               file_name,
-                               0,
-                               0,
-                               fmt::format("the file is larger than {} MiB", kMaxWorkloadBytes >> 20U),
-                               {}}});
+    return file_error(file_name, 0, fmt::format("the file is larger than {} MiB", kMaxWorkloadBytes >> 20U));
   }
   const Result<Node> root = yaml::parse(text, file_name);
   if (!root) return tl::unexpected<Diagnostics>(root.error());
@@ -627,7 +621,7 @@ Result<LoadedWorkload> read_workload(const Node &root, std::string file_name, Lo
 }
 
 Result<LoadedWorkload> load_workload(const std::filesystem::path &path, LoadOptions options) {
-  const Result<std::string> text = read_text_file(path, "a workload file", kMaxWorkloadBytes);
+  const Result<std::string> text = read_file(path.string(), kMaxWorkloadBytes);
   if (!text) return tl::unexpected<Diagnostics>(text.error());
   Result<LoadedWorkload> loaded = parse_workload(*text, path.string(), options);
   if (loaded) name_after(path, loaded->workload);

@@ -12,6 +12,7 @@
 #include "redag/base/check.hpp"
 #include "redag/base/cpu_list.hpp"
 #include "redag/loader/hyperperiod_warning.hpp"
+#include "redag/loader/text_file.hpp"
 #include "redag/loader/validate.hpp"
 #include "redag/loader/workload_yaml.hpp"
 #include "redag/loader/yaml_writer.hpp"
@@ -275,8 +276,7 @@ Result<void> save_workload(const Workload &workload, const std::filesystem::path
   std::ofstream stream(path, std::ios::binary | std::ios::trunc);
   if (stream) stream << to_yaml(workload) << std::flush;
   if (stream) return {};
-  Diagnostic why{Severity::Error, path.string(), 0, 0, fmt::format("cannot write: {}", std::strerror(errno)), {}};
-  return tl::unexpected<Diagnostics>(Diagnostics{std::move(why)});
+  return file_error(path.string(), 0, fmt::format("cannot write: {}", std::strerror(errno)));
 }
 
 }  // namespace redag

@@ -8,9 +8,9 @@
 #include <set>
 #include <string>
 
+#include "redag/loader/text_file.hpp"
 #include "redag/loader/workload_yaml.hpp"
 #include "redag/runtime/executor.hpp"
-#include "redag/trace/output_file.hpp"
 #include "tests/testing/one_worker.hpp"
 #include "tests/testing/repository.hpp"
 
@@ -115,7 +115,7 @@ TEST(DagBuilder, BuildsWhatAFileSays) {
 
 // A key that is new to the schema must come to the file above, and to the builder.
 TEST(DagBuilder, KnowsEveryKeyOfTheSchema) {
-  const auto text = trace::read_file((testing::repository() / "docs/workload.schema.json").string());
+  const auto text = read_file((testing::repository() / "docs/workload.schema.json").string());
   ASSERT_TRUE(text);
   const nlohmann::json schema = nlohmann::json::parse(*text);
   // Of ROS 2; an Executor is one cluster; its bodies do not wait without a worker.

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "redag/loader/provenance.hpp"
+#include "redag/loader/text_file.hpp"
 #include "redag/threads/clock.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/output_file.hpp"
@@ -30,11 +31,10 @@ constexpr Duration kDescribeEvery = kSecond;  // while measured execution times 
 Result<std::unique_ptr<Recorder>> Recorder::create(const std::string &folder, std::uint64_t most_bytes) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
-  if (error) return trace::file_error(folder, 0, "cannot create the folder of the record: " + error.message());
+  if (error) return file_error(folder, 0, "cannot create the folder of the record: " + error.message());
   if (::access(folder.c_str(), W_OK | X_OK) != 0) {
-    return trace::file_error(folder, 0,
-                             std::string("cannot write the record into this folder: ") + std::strerror(errno),
-                             "choose another folder, or its permissions");
+    return file_error(folder, 0, std::string("cannot write the record into this folder: ") + std::strerror(errno),
+                      "choose another folder, or its permissions");
   }
   const std::string path = folder + "/" + std::string(trace::kEventsFile);
   Result<std::string> aside = trace::move_unfinished_aside(path);

@@ -12,9 +12,9 @@
 #include <thread>
 
 #include "redag/base/rng.hpp"
+#include "redag/loader/text_file.hpp"
 #include "redag/trace/event_codec.hpp"
 #include "redag/trace/events_file.hpp"
-#include "redag/trace/output_file.hpp"
 #include "redag/trace/run_info_json.hpp"
 #include "tests/testing/builders.hpp"
 

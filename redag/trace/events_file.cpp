@@ -22,6 +22,7 @@
 
 #include "redag/base/check.hpp"
 #include "redag/base/text.hpp"
+#include "redag/loader/text_file.hpp"
 #include "redag/loader/validate.hpp"
 #include "redag/trace/event_codec.hpp"
 #include "redag/trace/input_file.hpp"

@@ -10,8 +10,8 @@
 #include <filesystem>
 
 #include "redag/base/rng.hpp"
+#include "redag/loader/text_file.hpp"
 #include "redag/loader/workload_yaml.hpp"
-#include "redag/trace/output_file.hpp"
 #include "redag/trace/run_info_json.hpp"
 #include "tests/testing/builders.hpp"
 

@@ -14,8 +14,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "redag/loader/text_file.hpp"
 #include "redag/trace/events_file.hpp"
-#include "redag/trace/output_file.hpp"
 #include "tests/testing/builders.hpp"
 
 namespace redag::trace {

@@ -12,7 +12,7 @@
 #include <cstring>
 #include <utility>
 
-#include "redag/trace/output_file.hpp"
+#include "redag/loader/text_file.hpp"
 
 namespace redag::trace {
 

@@ -63,16 +63,4 @@ class OutputFile {
   std::string buffer_;
 };
 
-/// The largest file that is read: an endless one (a device, a pipe) must not use all memory.
-inline constexpr std::size_t kMaxFileBytes = std::size_t{8} << 30U;
-
-/// Reads a whole file, for readers of our formats. Errors name the file.
-[[nodiscard]] Result<std::string> read_file(const std::string &path, std::size_t most = kMaxFileBytes);
-/// The same of an open file, which has this path: what has not been read of it.
-[[nodiscard]] Result<std::string> read_rest(int descriptor, const std::string &path, std::size_t most = kMaxFileBytes);
-
-/// Makes one error at a line of a file.
-[[nodiscard]] tl::unexpected<Diagnostics> file_error(const std::string &file, int line, std::string message,
-                                                     std::string hint = {});
-
 }  // namespace redag::trace

@@ -13,6 +13,8 @@
 #include <filesystem>
 #include <string>
 
+#include "redag/loader/text_file.hpp"
+
 namespace redag::trace {
 namespace {
 
@@ -115,22 +117,6 @@ TEST_F(OutputFileTest, AFullDiskIsReported) {
   ASSERT_EQ(::waitpid(child, &status, 0), child);
   EXPECT_EQ(status, 0);
   EXPECT_EQ(entries(), 0U);
-}
-
-TEST(ReadFile, DevicesAndLongFilesAreErrors) {
-  const auto device = read_file("/dev/zero");
-  ASSERT_FALSE(device);
-  EXPECT_EQ(device.error().front().message, "is a device, not a file");
-  // The limit holds for any reported size.
-  const auto kernel = read_file("/proc/self/maps", 16);
-  ASSERT_FALSE(kernel);
-  EXPECT_EQ(kernel.error().front().message, "is longer than 0 MiB");
-}
-
-TEST(ReadFile, MissingFileIsAnError) {
-  const auto text = read_file("/nonexistent/events.redag");
-  ASSERT_FALSE(text);
-  EXPECT_EQ(text.error().front().file, "/nonexistent/events.redag");
 }
 
 }  // namespace

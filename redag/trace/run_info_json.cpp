@@ -11,9 +11,9 @@
 #include <utility>
 
 #include "redag/base/text.hpp"
+#include "redag/loader/text_file.hpp"
 #include "redag/loader/validate.hpp"
 #include "redag/loader/workload_yaml.hpp"
-#include "redag/trace/output_file.hpp"
 
 namespace redag::trace {
 namespace {

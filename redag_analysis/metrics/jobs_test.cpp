@@ -11,7 +11,7 @@
 #include <filesystem>
 #include <sstream>
 
-#include "redag/trace/output_file.hpp"
+#include "redag/loader/text_file.hpp"
 #include "redag_analysis/metrics/files/jobs_csv.hpp"
 #include "tests/testing/builders.hpp"
 #include "tests/testing/trace_builder.hpp"
@@ -117,7 +117,7 @@ std::string csv_of(const trace::Trace &trace, std::size_t most_held) {
   EXPECT_TRUE(writer);
   for (const JobEvent &event : trace.events) writer->add(std::span(&event, 1));
   EXPECT_TRUE(writer->commit());
-  std::string text = trace::read_file(path).value();
+  std::string text = read_file(path).value();
   std::filesystem::remove(path);
   return text;
 }

@@ -7,9 +7,9 @@
 
 #include <fmt/format.h>
 
+#include "redag/loader/text_file.hpp"
 #include "redag/loader/workload_yaml.hpp"
 #include "redag/loader/workload_yaml_values.hpp"
-#include "redag/trace/output_file.hpp"
 #include "redag/version.hpp"
 #include "redag_lab/experiment/acceptance.hpp"
 #include "redag_lab/experiment/unit_store.hpp"
@@ -33,7 +33,7 @@ std::string subject_of(const std::string &plan) {
 }  // namespace
 
 Result<LoadedExperiment> load_experiment(const std::string &path, const ExecutorNames &executors, Drive drive) {
-  const Result<std::string> text = trace::read_file(path, kMaxWorkloadBytes);
+  const Result<std::string> text = read_file(path, kMaxWorkloadBytes);
   if (!text) return tl::unexpected<Diagnostics>(text.error());
   const Result<Node> root = yaml::parse(*text, path);
   if (!root) return tl::unexpected<Diagnostics>(root.error());
@@ -50,8 +50,8 @@ Result<LoadedExperiment> load_experiment(const std::string &path, const Executor
     for (const WorkloadSource &source : plan->workloads) identity += to_yaml(source.workload);
     loaded.experiment = std::make_unique<Factorial>(std::move(*plan), std::move(drive));
   } else {
-    return trace::file_error(path, kind == nullptr ? 1 : kind->line, "this is no plan of an experiment",
-                             "write 'experiment: acceptance' or 'experiment: factorial', see docs/experiments.md");
+    return file_error(path, kind == nullptr ? 1 : kind->line, "this is no plan of an experiment",
+                      "write 'experiment: acceptance' or 'experiment: factorial', see docs/experiments.md");
   }
   loaded.subject = subject_of(identity);
   return loaded;

@@ -23,13 +23,12 @@
 #include "redag/base/check.hpp"
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/mutex.hpp"
-#include "redag/trace/output_file.hpp"
+#include "redag/loader/text_file.hpp"
 
 namespace redag::experiment {
 namespace {
 
 namespace fs = std::filesystem;
-using trace::file_error;
 
 Time now() { return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1); }
 
@@ -52,7 +51,7 @@ std::optional<std::pair<std::uint64_t, std::string>> parse_row(std::string_view 
 
 // Reads the rows of a file. Returns the length of its whole rows: a killed process can leave a part of one.
 Result<std::size_t> read_rows(const std::string &file, const std::string &subject, const Accept &accept) {
-  const Result<std::string> text = trace::read_file(file);
+  const Result<std::string> text = read_file(file);
   if (!text) return tl::unexpected<Diagnostics>(text.error());
   std::string_view rest = *text;
   for (std::size_t end = 0; (end = rest.find('\n')) != std::string_view::npos; rest.remove_prefix(end + 1)) {

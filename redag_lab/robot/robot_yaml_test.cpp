@@ -193,7 +193,7 @@ TEST(RobotYaml, ReportsMistakesOfFilesInThem) {
 
 TEST(RobotYaml, TheShippedExampleIsSound) {
   const std::string path = (testing::repository() / "examples" / "robot" / "cart.yaml").string();
-  const Result<Input> input = parse_input(read_text_file(path, "a robot", kMaxWorkloadBytes).value(), path);
+  const Result<Input> input = parse_input(read_file(path, kMaxWorkloadBytes).value(), path);
   ASSERT_TRUE(input) << to_string(input.error());
   EXPECT_TRUE(input->loaded.warnings.empty()) << to_string(input->loaded.warnings);
   EXPECT_EQ(input->loaded.workload.task_count(), 7U);

@@ -18,6 +18,7 @@
 
 #include <fmt/format.h>
 
+#include "redag/loader/text_file.hpp"
 #include "redag/loader/workload_yaml.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/output_file.hpp"
@@ -78,7 +79,7 @@ int run_program(std::vector<std::string> words, const std::string &log, const st
 
 // Returns the program's last error message, or else its last line.
 std::string last_words(const std::string &log) {
-  const Result<std::string> text = trace::read_file(log);
+  const Result<std::string> text = read_file(log);
   if (!text || text->empty()) return "nothing";
   std::size_t at = text->rfind("error:");
   if (at == std::string::npos) at = text->find_last_of('\n', text->size() - 2) + 1;

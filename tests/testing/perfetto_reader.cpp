@@ -11,7 +11,7 @@
 #include <protozero/pbf_reader.hpp>
 #include <set>
 
-#include "redag/trace/output_file.hpp"
+#include "redag/loader/text_file.hpp"
 
 namespace redag::testing {
 namespace {
@@ -181,7 +181,7 @@ std::vector<PictureEvent> Picture::slices_of(const std::string &track) const {
 }
 
 Picture read_picture(const std::string &path) {
-  const Result<std::string> bytes = trace::read_file(path);
+  const Result<std::string> bytes = read_file(path);
   if (!bytes) {
     ADD_FAILURE() << to_string(bytes.error());
     return {};

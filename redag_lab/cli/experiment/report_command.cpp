@@ -8,7 +8,7 @@
 #include <system_error>
 
 #include "redag/base/text.hpp"
-#include "redag/trace/output_file.hpp"
+#include "redag/loader/text_file.hpp"
 #include "redag/trace/recording.hpp"
 #include "redag_lab/cli/run/recorded_runs.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
@@ -147,7 +147,7 @@ class Reporting {
 
 // Writes the page of an experiment.
 int report_experiment(const ReportArguments &options, const std::string &file, Console &console) {
-  const Result<std::string> text = trace::read_file(file);
+  const Result<std::string> text = read_file(file);
   if (!ok(text, console)) return kExitBad;
   const Json document = Json::parse(*text, nullptr, false);
   if (!document.is_object() || document.value("format", "") != "redag.experiment/1") {

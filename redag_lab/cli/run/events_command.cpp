@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "redag/base/text.hpp"
+#include "redag/loader/text_file.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/output_file.hpp"
 #include "redag/trace/run_info_json.hpp"
@@ -84,7 +85,7 @@ Result<void> check_place(const EventsOptions &options) {
   std::error_code ignored;
   const fs::file_status status = fs::symlink_status(options.output, ignored);
   if (fs::exists(status) && !fs::is_regular_file(status)) {
-    return trace::file_error(options.output, 0, "cannot write: it is not a file", "without -o, the events are printed");
+    return file_error(options.output, 0, "cannot write: it is not a file", "without -o, the events are printed");
   }
   return check_output(options.output);
 }

@@ -12,7 +12,7 @@
 #include <system_error>
 
 #include "redag/base/text.hpp"
-#include "redag/trace/output_file.hpp"
+#include "redag/loader/text_file.hpp"
 #include "redag_lab/cli/terminal/files.hpp"
 #include "redag_lab/cli/terminal/json.hpp"
 
@@ -58,9 +58,9 @@ std::vector<std::string> labels_of(const std::vector<fs::path> &subjects) {
 Result<void> read_comparison(const fs::path &file, std::vector<std::string> &order, std::vector<std::string> &notes) {
   std::error_code error;
   if (!fs::exists(file, error)) return {};
-  const Result<std::string> text = trace::read_file(file.string());
+  const Result<std::string> text = read_file(file.string());
   if (!text) return tl::unexpected<Diagnostics>(text.error());
-  const auto bad = [&] { return trace::file_error(file.string(), 1, "the file was not written by 'redag compare'"); };
+  const auto bad = [&] { return file_error(file.string(), 1, "the file was not written by 'redag compare'"); };
   if (json_is_too_large(*text)) return bad();
   const Json json = Json::parse(*text, nullptr, false);
   if (!json.is_object() || json.value("format", Json()) != "redag.comparison/3") return bad();
@@ -82,7 +82,7 @@ std::size_t place_in(const std::vector<std::string> &order, const fs::path &subj
 
 // Returns how many deadlines a run missed, as its summary.json says; 0 without one.
 std::uint64_t missed_in(const std::string &trace) {
-  const Result<std::string> text = trace::read_file((fs::path(trace).parent_path() / "summary.json").string());
+  const Result<std::string> text = read_file((fs::path(trace).parent_path() / "summary.json").string());
   if (!text || json_is_too_large(*text)) return 0;
   const Json json = Json::parse(*text, nullptr, false);
   if (!json.is_object() || !json.contains("total") || !json["total"].is_object()) return 0;

@@ -33,29 +33,14 @@ Result<void> write_in_place(const std::string &path, std::string_view text) {
       std::fflush(file.get()) == 0) {
     return {};
   }
-  return trace::file_error(path, 0, fmt::format("cannot write: {}", std::strerror(errno)));
-}
-
-Result<std::string> read_standard_input() {
-  std::string text;
-  std::string block(std::size_t{1} << 16U, '\0');
-  while (text.size() <= kMaxWorkloadBytes) {
-    const ssize_t count = ::read(STDIN_FILENO, block.data(), block.size());
-    if (count == 0) return text;
-    if (count > 0) {
-      text.append(block, 0, static_cast<std::size_t>(count));
-    } else if (errno != EINTR) {
-      return trace::file_error("<stdin>", 0, fmt::format("cannot read: {}", std::strerror(errno)));
-    }
-  }
-  return trace::file_error("<stdin>", 0, fmt::format("the file is longer than {} bytes", kMaxWorkloadBytes));
+  return file_error(path, 0, fmt::format("cannot write: {}", std::strerror(errno)));
 }
 
 }  // namespace
 
 Result<robot::Input> load_workload_or_robot(const std::string &path, LoadOptions options, std::string *source) {
   Result<std::string> text =
-      path == "-" ? read_standard_input() : read_text_file(path, "a workload file", kMaxWorkloadBytes);
+      path == "-" ? read_rest(STDIN_FILENO, "<stdin>", kMaxWorkloadBytes) : read_file(path, kMaxWorkloadBytes);
   if (!text) return tl::unexpected<Diagnostics>(std::move(text.error()));
   const bool is_file = path != "-";
   Result<robot::Input> input = robot::parse_input(*text, is_file ? path : "<stdin>", options);
@@ -76,34 +61,34 @@ Result<void> write_text(const std::string &path, std::string_view text) {
 
 Result<void> check_output(const std::string &path) {
   std::error_code ignored;
-  if (fs::is_directory(path, ignored)) return trace::file_error(path, 0, "cannot write: the path is a folder");
+  if (fs::is_directory(path, ignored)) return file_error(path, 0, "cannot write: the path is a folder");
   const fs::file_status status = fs::symlink_status(path, ignored);
   const bool in_place = fs::exists(status) && !fs::is_regular_file(status);
   const std::string folder = fs::path(path).parent_path().string();
   // A rename replaces the existing file, and needs the folder's permission only.
   const std::string place = in_place ? path : folder.empty() ? "." : folder;
   if (::access(place.c_str(), in_place ? W_OK : W_OK | X_OK) == 0) return {};
-  return trace::file_error(path, 0, fmt::format("cannot write: {}", std::strerror(errno)),
-                           errno == ENOENT ? "does the directory exist?" : "");
+  return file_error(path, 0, fmt::format("cannot write: {}", std::strerror(errno)),
+                    errno == ENOENT ? "does the directory exist?" : "");
 }
 
 Result<std::vector<std::string>> find_traces(const std::string &place) {
   std::error_code error;
-  if (!fs::exists(place, error)) return trace::file_error(place, 0, "no such file or folder");
+  if (!fs::exists(place, error)) return file_error(place, 0, "no such file or folder");
   if (!fs::is_directory(place, error)) {
     if (!place.ends_with(".yaml") && !place.ends_with(".yml")) return std::vector<std::string>{place};
-    return trace::file_error(place, 0, "this is a workload, and not a recorded run",
-                             fmt::format("'redag simulate {} --out DIR' makes one", place));
+    return file_error(place, 0, "this is a workload, and not a recorded run",
+                      fmt::format("'redag simulate {} --out DIR' makes one", place));
   }
   std::vector<std::string> files;
   fs::recursive_directory_iterator entry(place, error);
   for (const fs::recursive_directory_iterator end; !error && entry != end; entry.increment(error)) {
     if (entry->path().filename() == trace::kEventsFile) files.push_back(entry->path().string());
   }
-  if (error) return trace::file_error(place, 0, fmt::format("cannot list the folder: {}", error.message()));
+  if (error) return file_error(place, 0, fmt::format("cannot list the folder: {}", error.message()));
   if (files.empty()) {
-    return trace::file_error(place, 0, "no events.redag in this folder or below it",
-                             "'redag run', 'simulate' and 'compare' write one with '--out DIR'");
+    return file_error(place, 0, "no events.redag in this folder or below it",
+                      "'redag run', 'simulate' and 'compare' write one with '--out DIR'");
   }
   std::sort(files.begin(), files.end());
   return files;
@@ -112,9 +97,9 @@ Result<std::vector<std::string>> find_traces(const std::string &place) {
 Result<void> prepare_folder(const std::string &path) {
   std::error_code error;
   fs::create_directories(path, error);
-  if (error) return trace::file_error(path, 0, fmt::format("cannot create the folder: {}", error.message()));
+  if (error) return file_error(path, 0, fmt::format("cannot create the folder: {}", error.message()));
   if (::access(path.c_str(), W_OK | X_OK) != 0) {
-    return trace::file_error(path, 0, fmt::format("cannot write into the folder: {}", std::strerror(errno)));
+    return file_error(path, 0, fmt::format("cannot write into the folder: {}", std::strerror(errno)));
   }
   return {};
 }
