@@ -63,7 +63,8 @@ std::uint64_t unsigned_of(const Json &object, const char *key) {
 }
 
 template <class Values, class Name>
-auto one_of(const Values &values, Name name, const std::string &text, const char *key) {
+auto one_of(const Values &values, Name name, const Json &object, const char *key) {
+  const std::string text = text_of(object, key);
   for (const auto value : values) {
     if (text == name(value)) return value;
   }
@@ -71,22 +72,22 @@ auto one_of(const Values &values, Name name, const std::string &text, const char
 }
 
 template <class Enum>
-Enum one_of(const std::string &text, const char *key) {
-  const auto name = [](const Named<Enum> &named) { return named.name; };
-  return one_of(kValues<Enum>, name, text, key).value;
+Enum one_of(const Json &object, const char *key) {
+  return one_of(
+             kValues<Enum>, [](const Named<Enum> &named) { return named.name; }, object, key)
+      .value;
 }
 
 sched::Config config_from(const Json &json) {
   constexpr std::uint32_t kAny = std::numeric_limits<std::uint32_t>::max();
   sched::Config config;
   config.workers = small_of(json, "workers", 1, kMaxWorkers);
-  std::string preemption = text_of(json, "preemption");
-  if (preemption == "full") preemption = preemption_name(sched::Preemption::Full);  // in older files
-  config.preemption = one_of(kPreemptions, preemption_name, preemption, "preemption");
-  config.policy = one_of<PolicyKind>(text_of(json, "policy"), "policy");
+  const bool is_old = text_of(json, "preemption") == "full";
+  config.preemption = is_old ? sched::Preemption::Full : one_of(kPreemptions, preemption_name, json, "preemption");
+  config.policy = one_of<PolicyKind>(json, "policy");
   // Files from before ties were shared do not state them; their order was fixed.
   config.ties = Ties::Fixed;
-  if (json.contains("ties")) config.ties = one_of<Ties>(text_of(json, "ties"), "ties");
+  if (json.contains("ties")) config.ties = one_of<Ties>(json, "ties");
   config.levels = small_of(json, "levels", 0, kAny);
   config.max_started = small_of(json, "max_started", 0, kAny);
   return config;
@@ -100,13 +101,16 @@ Machine machine_from(const Json &json) {
   return machine;
 }
 
-// Files of runs without remarks, and those from before remarks existed, do not have the key.
+// Returns the rows of a list that files of earlier versions do not have, and that is left out if it would be empty.
+Json rows_of(const Json &object, const char *key) {
+  Json rows = object.value(key, Json::array());
+  if (!rows.is_array()) throw BadValue(std::string("'") + key + "' must be a list");
+  return rows;
+}
+
 std::vector<Remark> remarks_from(const Json &json) {
   std::vector<Remark> remarks;
-  const auto rows = json.find("remarks");
-  if (rows == json.end()) return remarks;
-  if (!rows->is_array()) throw BadValue("'remarks' must be a list");
-  for (const Json &row : *rows) {
+  for (const Json &row : rows_of(json, "remarks")) {
     Remark remark;
     remark.begun = integer_of(row, "begun_ns", -kMaxTraceTime, kMaxTraceTime);
     if (!member(row, "ended_ns").is_null()) {
@@ -121,10 +125,7 @@ std::vector<Remark> remarks_from(const Json &json) {
 // Present only in runs of an Executor with such tasks.
 std::vector<TaskId> event_tasks_from(const Json &json, std::size_t task_count) {
   std::vector<TaskId> tasks;
-  const auto rows = json.find("event_tasks");
-  if (rows == json.end()) return tasks;
-  if (!rows->is_array()) throw BadValue("'event_tasks' must be a list");
-  for (const Json &row : *rows) {
+  for (const Json &row : rows_of(json, "event_tasks")) {
     if (!row.is_number_unsigned() || row.get<std::uint64_t>() >= task_count) {
       throw BadValue("'event_tasks' must list positions of tasks in the workload");
     }
@@ -135,10 +136,7 @@ std::vector<TaskId> event_tasks_from(const Json &json, std::size_t task_count) {
 
 std::vector<Removal> removals_from(const Json &json, std::size_t task_count) {
   std::vector<Removal> removals;
-  const auto rows = json.find("removals");
-  if (rows == json.end()) return removals;
-  if (!rows->is_array()) throw BadValue("'removals' must be a list");
-  for (const Json &row : *rows) {
+  for (const Json &row : rows_of(json, "removals")) {
     const std::uint64_t task = unsigned_of(row, "task");
     if (task >= task_count) throw BadValue("'removals' must name positions of tasks in the workload");
     removals.push_back({TaskId(task), integer_of(row, "at_ns", -kMaxTraceTime, kMaxTraceTime)});
@@ -148,16 +146,13 @@ std::vector<Removal> removals_from(const Json &json, std::size_t task_count) {
 
 std::vector<Edge> edges_from(const Json &json, std::size_t task_count) {
   std::vector<Edge> edges;
-  const auto rows = json.find("edges");
-  if (rows == json.end()) return edges;
-  if (!rows->is_array()) throw BadValue("'edges' must be a list");
   const auto task_of = [&](const Json &row, const char *key) {
     const std::int64_t task = integer_of(row, key, 0, std::numeric_limits<std::uint32_t>::max());
     if (static_cast<std::size_t>(task) >= task_count)
       throw BadValue("'edges' must name positions of tasks in the workload");
     return TaskId(static_cast<std::size_t>(task));
   };
-  for (const Json &row : *rows) {
+  for (const Json &row : rows_of(json, "edges")) {
     Edge edge{.from = task_of(row, "from"), .to = task_of(row, "to")};
     edge.since = integer_of(row, "since_ns", -kMaxTraceTime, kMaxTraceTime);
     if (row.contains("until_ns")) edge.until = integer_of(row, "until_ns", -kMaxTraceTime, kMaxTraceTime);
@@ -187,7 +182,7 @@ RunInfo info_from(const Json &json) {
   info.preemption = text_of(json, "preemption");
   info.preemption_why = text_of(json, "preemption_why");
   info.driver = one_of(
-      kDrivers, [](Driver d) { return to_string(d); }, text_of(json, "driver"), "driver");
+      kDrivers, [](Driver d) { return to_string(d); }, json, "driver");
   info.seed = unsigned_of(json, "seed");
   info.start = integer_of(json, "start_ns", -kMaxTraceTime, kMaxTraceTime);
   info.end = integer_of(json, "end_ns", -kMaxTraceTime, kMaxTraceTime);
