@@ -94,6 +94,12 @@ struct RunInfo {
   std::optional<Time> settled;
 };
 
+/// Returns the workers of the run. For ROS 2 nodes, config.workers counts the threads that executed callbacks. With
+/// preemption `os` these are more than ran at the same time, and their number differs between repetitions.
+[[nodiscard]] inline std::uint32_t worker_count(const RunInfo &info) {
+  return info.driver == Driver::RosNodes ? info.workload.platform.workers : info.config.workers;
+}
+
 struct Trace {
   RunInfo info;
   std::vector<JobEvent> events;

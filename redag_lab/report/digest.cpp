@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "redag/base/check.hpp"
-#include "redag/trace/worker_count.hpp"
+#include "redag/trace/trace.hpp"
 #include "redag_analysis/metrics/check/trace_checker.hpp"
 #include "redag_analysis/metrics/miss.hpp"
 

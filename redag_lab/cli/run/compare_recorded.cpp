@@ -8,7 +8,7 @@
 #include <algorithm>
 
 #include "redag/trace/events_file.hpp"
-#include "redag/trace/worker_count.hpp"
+#include "redag/trace/trace.hpp"
 #include "redag_lab/cli/run/difference_report.hpp"
 #include "redag_lab/cli/run/recorded_runs.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"

@@ -10,7 +10,7 @@
 
 #include "redag/base/text.hpp"
 #include "redag/base/words.hpp"
-#include "redag/trace/worker_count.hpp"
+#include "redag/trace/trace.hpp"
 #include "redag_analysis/text/table.hpp"
 
 namespace redag::cli {

@@ -20,7 +20,7 @@
 #include "redag/loader/workload_yaml.hpp"
 #include "redag/model/demand.hpp"
 #include "redag/threads/setup.hpp"
-#include "redag/trace/worker_count.hpp"
+#include "redag/trace/trace.hpp"
 #include "redag_analysis/metrics/check/trace_checker.hpp"
 #include "redag_analysis/metrics/jobs.hpp"
 #include "workload_run.hpp"
