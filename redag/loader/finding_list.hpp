@@ -21,25 +21,26 @@ class FindingList {
     task_ = task;
   }
 
-  /// Adds a finding that points at `at`. The rule examined this field and those of `involves`.
-  Finding &error(Field at, FieldSet involves, std::string message, std::string hint = {}) {
-    return add(Severity::Error, at, involves, std::move(message), std::move(hint));
+  /// Adds a finding that points at `at`, or at an item of it. The rule examined this field and those of `involves`.
+  void error(Field at, FieldSet involves, std::string message, std::string hint = {}, std::size_t item = kNone) {
+    add(Severity::Error, at, involves, std::move(message), std::move(hint), item);
   }
-  Finding &warning(Field at, FieldSet involves, std::string message, std::string hint = {}) {
-    return add(Severity::Warning, at, involves, std::move(message), std::move(hint));
+  void warning(Field at, FieldSet involves, std::string message, std::string hint = {}, std::size_t item = kNone) {
+    add(Severity::Warning, at, involves, std::move(message), std::move(hint), item);
   }
 
   [[nodiscard]] std::vector<Finding> take() { return std::move(findings_); }
 
  private:
-  Finding &add(Severity severity, Field at, FieldSet involves, std::string message, std::string hint) {
-    involves |= at;
-    return findings_.emplace_back(
-        Finding{severity, dag_, task_, at, Finding::kNone, involves, std::move(message), std::move(hint)});
+  static constexpr std::uint32_t kNone = Finding::kNone;
+
+  void add(Severity severity, Field at, FieldSet involves, std::string message, std::string hint, std::size_t item) {
+    findings_.emplace_back(Finding{severity, dag_, task_, at, static_cast<std::uint32_t>(item), involves | at,
+                                   std::move(message), std::move(hint)});
   }
 
   DagId dag_;
-  std::uint32_t task_ = Finding::kNone;
+  std::uint32_t task_ = kNone;
   std::vector<Finding> findings_;
 };
 

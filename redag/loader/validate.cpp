@@ -6,41 +6,31 @@
 #include <algorithm>
 #include <array>
 #include <string_view>
+#include <tuple>
+#include <type_traits>
 #include <unordered_map>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include "redag/base/cpu_list.hpp"
 #include "redag/base/text.hpp"
 #include "redag/loader/callback_match.hpp"
-#include "redag/loader/validate_edges.hpp"
-#include "redag/loader/validate_waits.hpp"
+#include "redag/loader/fields.hpp"
+#include "redag/loader/validate_parts.hpp"
 #include "redag/model/clusters.hpp"
 
 namespace redag {
 namespace {
 
-constexpr std::array<const char *, kFieldCount> kFieldNames = {
-    "name",       "platform",    "workers",     "preemption", "policy", "ties",      "dags",      "tasks",
-    "max_active", "max_pending", "criticality", "degrade",    "edges",  "wcet",      "wcet_low",  "bcet",
-    "period",     "deadline",    "offset",      "jitter",     "region", "budget",    "on_budget", "activation",
-    "overrun",    "priority",    "concurrency", "group",      "after",  "execution", "callback",  "clusters",
-    "cluster",    "cpus",        "segments",    "devices",    "rate"};
-
-struct DurationRule {
-  Field field;
-  Duration Task::*member;
-  Duration smallest;
-};
-
-constexpr std::array kDurationRules = {
-    DurationRule{Field::Wcet, &Task::wcet, 1},        DurationRule{Field::Bcet, &Task::bcet, 0},
-    DurationRule{Field::Period, &Task::period, 1},    DurationRule{Field::Deadline, &Task::deadline, 1},
-    DurationRule{Field::Offset, &Task::offset, 0},    DurationRule{Field::Jitter, &Task::jitter, 0},
-    DurationRule{Field::Region, &Task::region, 0},    DurationRule{Field::Budget, &Task::budget, 0},
-    DurationRule{Field::WcetLow, &Task::wcet_low, 0},
-};
+constexpr std::array<const char *, kFieldCount> kKeys = [] {
+  std::array<const char *, kFieldCount> keys{};
+  const auto add = [&](const auto &row) { keys[static_cast<std::size_t>(row.field)] = row.key; };
+  fields::for_each(std::tuple_cat(fields::kWorkload, fields::kPlatform, fields::kCluster, fields::kDevice, fields::kDag,
+                                  fields::kTask),
+                   add);
+  return keys;
+}();
+static_assert(std::find(kKeys.begin(), kKeys.end(), nullptr) == kKeys.end(), "each Field has a row");
 
 /// Walks through one workload and applies every rule, with the place of its findings.
 class Checker {
@@ -49,159 +39,32 @@ class Checker {
 
   std::vector<Finding> run() {
     if (!workload_.name.empty()) check_name(workload_.name, "workload");
-    check_platform();
-    check_clusters();
-    check_devices(workload_, findings_);
+    check_platform(workload_.platform, findings_);
+    check_policy();
     if (workload_.dags.empty()) {
       findings_.error(Field::Dags, Field::Dags, "the workload has no DAGs", "add one under 'dags:'");
     }
     check_dag_names();
     for (std::size_t d = 0; d < workload_.dags.size(); ++d) check_dag(DagId(d));
     findings_.at(DagId::none());
-    check_load();
+    check_load(workload_, findings_);
     return findings_.take();
   }
 
  private:
-  void check_platform() {
-    const Platform &platform = workload_.platform;
-    if (platform.clusters.empty() && (platform.workers < 1 || platform.workers > kMaxWorkers)) {
-      findings_.error(Field::Workers, {},
-                      fmt::format("workers must be from 1 to {}, not {}", kMaxWorkers, platform.workers));
+  void check_policy() {
+    const PolicyKind policy = workload_.policy;
+    if (workload_.platform.preemption == PreemptionMode::Os && !is_static(policy)) {
+      findings_.error(Field::Preemption, Field::Policy,
+                      fmt::format("preemption 'os' needs a static policy, and '{}' is not one", to_string(policy)),
+                      "use cooperative or none, or another policy");
     }
-    if (platform.clusters.empty()) {
-      std::unordered_map<int, std::size_t> owners;
-      check_cpus(platform.cpus, platform.workers, 0, owners);
-    }
-    const bool dynamic = !is_static(workload_.policy);
-    if (platform.preemption == PreemptionMode::Os && dynamic) {
-      findings_.error(
-          Field::Preemption, Field::Policy,
-          fmt::format("preemption 'os' needs a static policy, and '{}' is not one", to_string(workload_.policy)),
-          "use cooperative or none, or another policy");
-    }
-    const auto has_priority = [](const Dag &dag) {
-      return std::any_of(dag.tasks.begin(), dag.tasks.end(),
-                         [](const Task &task) { return task.priority.has_value(); });
-    };
-    if (workload_.policy == PolicyKind::Fixed &&
-        std::none_of(workload_.dags.begin(), workload_.dags.end(), has_priority)) {
+    const auto has_priority = [](const TaskRef &ref) { return ref.task->priority.has_value(); };
+    const std::vector<TaskRef> tasks = flatten(workload_);
+    if (policy == PolicyKind::Fixed && std::none_of(tasks.begin(), tasks.end(), has_priority)) {
       findings_.warning(Field::Policy, Field::Priority, "policy is 'fixed', but no task has a priority",
                         "give tasks a 'priority', or choose another policy");
     }
-  }
-
-  // Places the findings about one cluster.
-  void refuse_cluster(std::size_t cluster, FieldSet involves, std::string message, std::string hint = {}) {
-    findings_.error(Field::Clusters, involves, std::move(message), std::move(hint)).item =
-        static_cast<std::uint32_t>(cluster);
-  }
-
-  void check_clusters() {
-    const std::vector<Cluster> &clusters = workload_.platform.clusters;
-    if (clusters.empty()) return;
-    if (!workload_.platform.cpus.empty()) {
-      findings_.error(Field::Cpus, Field::Clusters, "the platform has both 'cpus' and 'clusters'",
-                      "each cluster has cpus of its own");
-    }
-    if (clusters.size() > kMaxClusters) {
-      findings_.error(Field::Clusters, {},
-                      fmt::format("there are {} clusters; at most {} are allowed", clusters.size(), kMaxClusters));
-    }
-    std::unordered_map<std::string_view, std::size_t> names;
-    std::unordered_map<int, std::size_t> owners;  // of processors
-    std::uint64_t workers = 0;
-    for (std::size_t c = 0; c < clusters.size(); ++c) {
-      const Cluster &cluster = clusters[c];
-      if (cluster.name.empty()) {
-        refuse_cluster(c, Field::Name, "a cluster has no name", "add 'name:'");
-      } else if (const std::string why = name_mistake(cluster.name); !why.empty()) {
-        refuse_cluster(c, Field::Name, fmt::format("the name {} of a cluster {}", in_quotes(cluster.name), why));
-      } else if (!names.emplace(cluster.name, c).second) {
-        refuse_cluster(c, Field::Name, fmt::format("the name '{}' is used by another cluster", cluster.name),
-                       "choose a unique name for each cluster");
-      }
-      if (cluster.workers < 1 || cluster.workers > kMaxWorkers) {
-        refuse_cluster(c, Field::Workers,
-                       fmt::format("workers of cluster '{}' must be from 1 to {}, not {}", cluster.name, kMaxWorkers,
-                                   cluster.workers));
-      }
-      workers += cluster.workers;
-      check_cpus(cluster.cpus, cluster.workers, c, owners);
-    }
-    if (workload_.platform.workers == workers && workers <= kMaxWorkers) return;
-    findings_.error(Field::Clusters, Field::Workers,
-                    workers > kMaxWorkers ? fmt::format("the clusters have {} workers; together at most {} are allowed",
-                                                        workers, kMaxWorkers)
-                                          : fmt::format("the platform has {} workers, but its clusters have {}",
-                                                        workload_.platform.workers, workers));
-  }
-
-  // The processors of cluster `c`, or of the platform if there are no clusters.
-  void check_cpus(const std::vector<int> &cpus, std::uint32_t workers, std::size_t c,
-                  std::unordered_map<int, std::size_t> &owners) {
-    const std::vector<Cluster> &clusters = workload_.platform.clusters;
-    const bool is_cluster = c < clusters.size();
-    const std::string owned = is_cluster ? fmt::format("cluster '{}'", clusters[c].name) : "the platform";
-    const auto add = [&](Severity severity, std::string message, std::string hint = {}) {
-      const Field at = is_cluster ? Field::Clusters : Field::Cpus;
-      Finding &finding = severity == Severity::Error
-                             ? findings_.error(at, Field::Cpus, std::move(message), std::move(hint))
-                             : findings_.warning(at, Field::Cpus | Field::Workers, std::move(message), std::move(hint));
-      if (is_cluster) finding.item = static_cast<std::uint32_t>(c);
-    };
-    for (const int cpu : cpus) {
-      if (cpu < 0 || cpu > kMaxCpu) {
-        add(Severity::Error, fmt::format("{} has processor {}, which is not from 0 to {}", owned, cpu, kMaxCpu));
-        return;
-      }
-      const auto [owner, is_first] = owners.emplace(cpu, c);
-      if (is_first) continue;
-      if (owner->second == c) {
-        add(Severity::Error, fmt::format("processor {} of {} is listed twice", cpu, owned), "list each one once");
-      } else {
-        add(Severity::Error,
-            fmt::format("processor {} of {} is also one of cluster '{}'", cpu, owned, clusters[owner->second].name),
-            "clusters share no processors");
-      }
-      return;
-    }
-    if (cpus.empty() || workers <= cpus.size()) return;
-    add(Severity::Warning,
-        fmt::format("{} has {} workers, but {} processor{}", owned, workers, cpus.size(), cpus.size() == 1 ? "" : "s"),
-        fmt::format("list more processors, or write 'workers: {}': bounds and simulations assume a processor for each "
-                    "worker",
-                    cpus.size()));
-  }
-
-  // Requires a place in the DAG.
-  void check_cluster_of(const Dag &dag) {
-    const std::vector<Cluster> &clusters = workload_.platform.clusters;
-    if (cluster_of(workload_.platform, dag)) return;
-    if (dag.cluster.empty()) {
-      if (clusters.empty()) return;
-      findings_.error(Field::Cluster, Field::Clusters, fmt::format("DAG '{}' has no cluster", dag.name),
-                      "add 'cluster:' with " + names_of_clusters());
-    } else if (clusters.empty()) {
-      findings_.error(Field::Cluster, Field::Clusters,
-                      fmt::format("DAG '{}' names a cluster, but the platform has no clusters", dag.name),
-                      "add 'clusters:' to the platform, or remove 'cluster:'");
-    } else {
-      findings_.error(Field::Cluster, Field::Clusters,
-                      fmt::format("there is no cluster {}, which DAG '{}' names", in_quotes(dag.cluster), dag.name),
-                      "choose " + names_of_clusters());
-    }
-  }
-
-  // Many DAGs can have this hint, which is therefore short.
-  [[nodiscard]] std::string names_of_clusters() const {
-    constexpr std::size_t kMostBytes = 200;
-    std::string names;
-    for (const Cluster &cluster : workload_.platform.clusters) {
-      names += (names.empty() ? "" : ", ") + cluster.name;
-      if (names.size() > kMostBytes) return "a cluster of the platform";
-    }
-    return workload_.platform.clusters.size() == 1 ? names : "one of " + names;
   }
 
   // Groups exclude jobs within one scheduler, and each cluster has its own.
@@ -227,14 +90,6 @@ class Checker {
     }
   }
 
-  void check_bound(const Dag &dag, Field field, std::uint32_t value) {
-    if (value <= kMaxBound) return;
-    findings_.error(
-        field, {},
-        fmt::format("{} of DAG '{}' must be from 1 to {}, not {}", to_string(field), dag.name, kMaxBound, value),
-        "leave it out if there is no bound");
-  }
-
   void check_dag_names() {
     std::unordered_map<std::string_view, std::size_t> seen;
     for (std::size_t d = 0; d < workload_.dags.size(); ++d) {
@@ -252,15 +107,12 @@ class Checker {
   void check_dag(DagId id) {
     findings_.at(id);
     const Dag &dag = workload_.dags[id.value];
-    if (dag.deadline < 0 || dag.deadline > kMaxDuration) {
-      findings_.error(Field::Deadline, {},
-                      fmt::format("deadline of DAG '{}' must be from 0 to {}, not {}", dag.name, kMaxDurationText,
-                                  format_duration(dag.deadline)));
-    }
-    check_bound(dag, Field::MaxActive, dag.max_active);
-    check_bound(dag, Field::MaxPending, dag.max_pending);
+    check_numbers(dag, fields::kDag, fmt::format(" of DAG '{}'", dag.name), [&](Field field, std::string mistake) {
+      const bool is_bound = field == Field::MaxActive || field == Field::MaxPending;
+      findings_.error(field, {}, std::move(mistake), is_bound ? "leave it out if there is no bound" : "");
+    });
     check_degrade(dag);
-    check_cluster_of(dag);
+    check_cluster_of(workload_.platform, dag, findings_);
     if (dag.tasks.empty()) findings_.error(Field::Tasks, {}, fmt::format("DAG '{}' has no tasks", dag.name));
     std::unordered_map<std::string_view, std::size_t> seen;
     seen.reserve(dag.tasks.size());
@@ -304,28 +156,20 @@ class Checker {
   }
 
   void check_durations(const Task &task) {
-    for (const DurationRule &rule : kDurationRules) {
-      const Duration value = task.*rule.member;
-      const char *name = to_string(rule.field);
-      if (rule.field == Field::Wcet && value == 0 && options_.wcet_optional && task.callback) continue;
+    check_numbers(task, fields::kTask, fmt::format(" of task '{}'", task.name), [&](Field field, std::string mistake) {
+      if (field == Field::Wcet && task.wcet == 0 && options_.wcet_optional && task.callback) return;
       // check_inherited_periods() checks the period of a data task.
-      if (rule.field == Field::Period && task.activation == Activation::Data) continue;
+      if (field == Field::Period && task.activation == Activation::Data) return;
       // A deadline that was copied from a bad period is not a second mistake.
-      if (rule.field == Field::Deadline && task.period <= 0 && value == task.period) continue;
-      if (rule.field == Field::Period && value == 0) {
-        findings_.error(rule.field, {}, fmt::format("timer task '{}' has no period", task.name),
-                        "add 'period:' to it or to its DAG, or use 'activation: data'");
-      } else if (value < rule.smallest) {
-        findings_.error(
-            rule.field, rule.field == Field::Deadline ? FieldSet(Field::Period) : FieldSet(),
-            fmt::format("{} of task '{}' must {}, not {}", name, task.name,
-                        rule.smallest == 0 ? "not be negative" : "be greater than zero", format_duration(value)));
-      } else if (value > kMaxDuration) {
-        findings_.error(
-            rule.field, {},
-            fmt::format("{} of task '{}' is too large; at most {} is allowed", name, task.name, kMaxDurationText));
+      const bool is_deadline = field == Field::Deadline;
+      if (is_deadline && task.period <= 0 && task.deadline == task.period) return;
+      std::string hint;
+      if (field == Field::Period && task.period == 0) {
+        mistake = fmt::format("timer task '{}' has no period", task.name);
+        hint = "add 'period:' to it or to its DAG, or use 'activation: data'";
       }
-    }
+      findings_.error(field, is_deadline ? FieldSet(Field::Period) : FieldSet(), std::move(mistake), std::move(hint));
+    });
     check_against_wcet(task);
     if (task.activation == Activation::Timer && task.period > 0 && task.jitter > task.period) {
       findings_.error(Field::Jitter, Field::Period,
@@ -425,11 +269,10 @@ class Checker {
     for (std::size_t i = 0; i < model.samples.size(); ++i) {
       const Duration sample = model.samples[i];
       if (sample > 0 && sample >= task.bcet && sample <= task.wcet) continue;
-      findings_
-          .error(Field::Execution, bounds,
-                 fmt::format("sample {} of task '{}' is not between its bcet and its wcet", format_duration(sample),
-                             task.name))
-          .item = static_cast<std::uint32_t>(i);
+      findings_.error(Field::Execution, bounds,
+                      fmt::format("sample {} of task '{}' is not between its bcet and its wcet",
+                                  format_duration(sample), task.name),
+                      "", i);
     }
   }
 
@@ -451,13 +294,11 @@ class Checker {
       if (task.predecessors[k] >= dag.tasks.size()) continue;
       const Task &from = dag.tasks[task.predecessors[k]];
       if (from.phase == Phase::Common || from.period != task.period || from.offset != task.offset) continue;
-      findings_
-          .error(Field::After, FieldSet(Field::Period) | Field::Offset | Field::Activation,
-                 fmt::format("timer task '{}' waits for jobs of '{}' that are released at the same instants, but "
-                             "nothing synchronises the two",
-                             task.name, from.name),
-                 "use 'activation: data'")
-          .item = k;
+      findings_.error(Field::After, FieldSet(Field::Period) | Field::Offset | Field::Activation,
+                      fmt::format("timer task '{}' waits for jobs of '{}' that are released at the same instants, but "
+                                  "nothing synchronises the two",
+                                  task.name, from.name),
+                      "use 'activation: data'", k);
     }
   }
 
@@ -484,11 +325,7 @@ class Checker {
                       fmt::format("queue depth of task '{}' must be from 1 to {}, not {}", task.name, kMaxQueueDepth,
                                   task.queue_depth));
     }
-    if (task.concurrency < 1 || task.concurrency > kMaxConcurrency) {
-      findings_.error(Field::Concurrency, {},
-                      fmt::format("concurrency of task '{}' must be from 1 to {}, not {}", task.name, kMaxConcurrency,
-                                  task.concurrency));
-    } else if (task.concurrency > 1 && !task.group.empty()) {
+    if (task.concurrency > 1 && task.concurrency <= kMaxConcurrency && !task.group.empty()) {
       findings_.error(
           Field::Concurrency, Field::Group,
           fmt::format("task '{}' has concurrency {}, but is in group '{}'", task.name, task.concurrency, task.group),
@@ -509,7 +346,7 @@ class Checker {
     const bool is_timer = callback.kind == Callback::Kind::Timer;
     const bool is_counted = is_timer || callback.kind == Callback::Kind::Waitable;
     const auto refuse = [&](std::uint32_t item, std::string message, std::string hint = {}) {
-      findings_.error(Field::Callback, {}, std::move(message), std::move(hint)).item = item;
+      findings_.error(Field::Callback, {}, std::move(message), std::move(hint), item);
     };
     check_callback_name(task, callback.node, "node", kCallbackNode);
     if (!is_counted) {
@@ -530,11 +367,10 @@ class Checker {
       refuse(kCallbackKind, fmt::format("the {} of task '{}' cannot have an index", kind, task.name));
     }
     if (is_timer && task.activation == Activation::Data) {
-      findings_
-          .error(Field::Callback, Field::Activation,
-                 fmt::format("data task '{}' has a timer as its callback", task.name),
-                 "predecessors release it: name the callback that takes their data, or use 'activation: timer'")
-          .item = kCallbackKind;
+      findings_.error(Field::Callback, Field::Activation,
+                      fmt::format("data task '{}' has a timer as its callback", task.name),
+                      "predecessors release it: name the callback that takes their data, or use 'activation: timer'",
+                      kCallbackKind);
     }
     const auto [other, is_first] = callbacks_.emplace(to_string(callback), task.name);
     if (!is_first) {
@@ -547,47 +383,9 @@ class Checker {
   void check_callback_name(const Task &task, const std::string &name, const char *what, std::uint32_t item) {
     const std::string why = ros_name_mistake(name);
     if (why.empty()) return;
-    findings_
-        .error(Field::Callback, {}, fmt::format("{} '{}' of the callback of task '{}' {}", what, name, task.name, why),
-               "write full names as 'ros2 node info' prints them; * and ? match any characters")
-        .item = item;
-  }
-
-  void check_load() {
-    const Platform &platform = workload_.platform;
-    if (platform.clusters.empty()) {
-      check_load(workload_.utilization(), platform.workers, "", Finding::kNone);
-      return;
-    }
-    std::vector<double> loads(platform.clusters.size(), 0);
-    std::vector<bool> serves(platform.clusters.size(), false);
-    for (const Dag &dag : workload_.dags) {
-      const std::optional<std::size_t> cluster = cluster_of(platform, dag);
-      if (!cluster) continue;
-      loads[*cluster] += dag.utilization();
-      serves[*cluster] = true;
-    }
-    for (std::uint32_t c = 0; c < platform.clusters.size(); ++c) {
-      const Cluster &cluster = platform.clusters[c];
-      check_load(loads[c], cluster.workers, fmt::format(" of cluster '{}'", cluster.name), c);
-      if (serves[c]) continue;
-      findings_
-          .warning(Field::Clusters, FieldSet(Field::Cluster) | Field::Dags | Field::Name,
-                   fmt::format("no DAG is in cluster '{}'", cluster.name))
-          .item = c;
-    }
-  }
-
-  void check_load(double utilization, std::uint32_t workers, const std::string &whose, std::uint32_t cluster) {
-    constexpr double kRounding = 1e-9;
-    if (utilization <= static_cast<double>(workers) * (1 + kRounding)) return;
-    findings_
-        .warning(cluster == Finding::kNone ? Field::Workers : Field::Clusters,
-                 Field::Workers | Field::Wcet | Field::Period | Field::Cluster,
-                 fmt::format("utilization {:.4g}{} exceeds the capacity of {} worker{}", utilization, whose, workers,
-                             workers == 1 ? "" : "s"),
-                 "no schedule meets every deadline if jobs execute for their wcet")
-        .item = cluster;
+    findings_.error(Field::Callback, {},
+                    fmt::format("{} '{}' of the callback of task '{}' {}", what, name, task.name, why),
+                    "write full names as 'ros2 node info' prints them; * and ? match any characters", item);
   }
 
   const Workload &workload_;
@@ -609,7 +407,7 @@ std::string name_mistake(std::string_view name) {
   return character.empty() ? std::string() : fmt::format("contains {}, which cannot be displayed", character);
 }
 
-const char *to_string(Field field) { return kFieldNames[static_cast<std::size_t>(field)]; }
+const char *to_string(Field field) { return kKeys[static_cast<std::size_t>(field)]; }
 
 std::vector<Finding> find_mistakes(const Workload &workload, ValidateOptions options) {
   return Checker(workload, options).run();

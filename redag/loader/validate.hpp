@@ -30,7 +30,7 @@ inline constexpr std::size_t kMaxWaits = 64;  // of one task
 /// Says why `name` cannot stand in one-line messages and tables: "is empty", "contains U+001B, ...". Empty if it can.
 [[nodiscard]] std::string name_mistake(std::string_view name);
 
-/// The parts of a workload. to_string() gives the key of the file format.
+/// The parts of a workload; fields.hpp says what each may be. to_string() gives the key of the file format.
 enum class Field : std::uint8_t {
   Name,
   Platform,
@@ -68,10 +68,12 @@ enum class Field : std::uint8_t {
   Cpus,
   Segments,
   Devices,
+  Slots,
+  Queue,
   Rate,  // in place of Period; find_mistakes() knows periods only
 };
 
-inline constexpr std::size_t kFieldCount = 37;
+inline constexpr std::size_t kFieldCount = static_cast<std::size_t>(Field::Rate) + 1;
 
 [[nodiscard]] const char *to_string(Field field);
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag/loader/validate_edges.hpp"
+#include "redag/loader/validate_parts.hpp"
 
 #include <algorithm>
 #include <string>
@@ -19,9 +19,8 @@ void report_duplicate_edges(const Dag &dag, const Task &task, FindingList &findi
   for (std::uint32_t k = 0; k < task.predecessors.size(); ++k) {
     const std::uint32_t p = task.predecessors[k];
     if (p >= dag.tasks.size() || first.emplace(p, k).second) continue;
-    findings
-        .error(Field::After, {}, fmt::format("task '{}' names predecessor '{}' twice", task.name, dag.tasks[p].name))
-        .item = k;
+    findings.error(Field::After, {},
+                   fmt::format("task '{}' names predecessor '{}' twice", task.name, dag.tasks[p].name), "", k);
   }
 }
 
@@ -114,7 +113,7 @@ bool check_edges(const Dag &dag, std::uint32_t index, FindingList &findings) {
       continue;
     }
     sound = false;
-    findings.error(Field::After, {}, std::move(message)).item = k;
+    findings.error(Field::After, {}, std::move(message), "", k);
   }
   std::sort(seen.begin(), seen.end());
   if (std::adjacent_find(seen.begin(), seen.end()) == seen.end()) return sound;

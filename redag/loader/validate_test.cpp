@@ -27,8 +27,7 @@ TEST(Validate, RefusesWhatOnlyCppCanBuild) {
   EXPECT_NE(found.find("workers must be from 1 to 4096, not 0"), std::string::npos) << found;
   EXPECT_NE(found.find("predecessor 7 of task 'a' does not exist"), std::string::npos) << found;
   EXPECT_NE(found.find("wcet of task 'a' is too large"), std::string::npos) << found;
-  EXPECT_NE(found.find("deadline of DAG 'd' must be from 0 to 1281023h (146 years), not -1ns"), std::string::npos)
-      << found;
+  EXPECT_NE(found.find("deadline of DAG 'd' must not be negative, not -1ns"), std::string::npos) << found;
 }
 
 TEST(Validate, RefusesNamesThatCannotBeShown) {

@@ -1,44 +1,35 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag/loader/validate_waits.hpp"
+#include "redag/loader/validate_parts.hpp"
 
 #include <string>
-#include <string_view>
-#include <unordered_set>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "redag/base/text.hpp"
-#include "redag/loader/validate.hpp"
 #include "redag/model/waits.hpp"
 
 namespace redag {
 namespace {
 
-// Places a finding about one device or wait.
-void refuse(FindingList &findings, Field field, std::size_t item, FieldSet involves, std::string message,
-            std::string hint = {}) {
-  findings.error(field, involves, std::move(message), std::move(hint)).item = static_cast<std::uint32_t>(item);
-}
-
 void check_wait(const Workload &workload, const Task &task, std::size_t index, FindingList &findings) {
   const Wait &wait = task.waits[index];
-  const auto refuse_it = [&](std::string message, std::string hint = {}) {
-    refuse(findings, Field::Segments, index, Field::Devices, std::move(message), std::move(hint));
+  const auto refuse = [&](std::string message, const char *hint = "") {
+    findings.error(Field::Segments, Field::Devices, std::move(message), hint, index);
   };
   if (wait.longest < 1 || wait.longest > kMaxDuration) {
-    refuse_it(fmt::format("a wait of task '{}' must last from 1 ns to {}, not {}", task.name, kMaxDurationText,
-                          format_duration(wait.longest)));
+    refuse(fmt::format("a wait of task '{}' must last from 1 ns to {}, not {}", task.name, kMaxDurationText,
+                       format_duration(wait.longest)));
   }
   if (wait.shortest < 0 || wait.shortest > wait.longest) {
-    refuse_it(fmt::format("at_least {} of a wait of task '{}' is not from 0 to its longest time {}",
-                          format_duration(wait.shortest), task.name, format_duration(wait.longest)));
+    refuse(fmt::format("at_least {} of a wait of task '{}' is not from 0 to its longest time {}",
+                       format_duration(wait.shortest), task.name, format_duration(wait.longest)));
   }
   if (wait.device.valid() && wait.device.value >= workload.platform.devices.size()) {
-    refuse_it(fmt::format("task '{}' waits for a device that the platform does not have", task.name),
-              "add it to 'devices:' of the platform");
+    refuse(fmt::format("task '{}' waits for a device that the platform does not have", task.name),
+           "add it to 'devices:' of the platform");
   }
   const Duration earliest = index == 0 ? 1 : task.waits[index - 1].after + 1;
   if (wait.after < earliest || wait.after >= task.wcet) {
@@ -49,32 +40,6 @@ void check_wait(const Workload &workload, const Task &task, std::size_t index, F
 }
 
 }  // namespace
-
-void check_devices(const Workload &workload, FindingList &findings) {
-  const std::vector<Device> &devices = workload.platform.devices;
-  if (devices.size() > kMaxDevices) {
-    findings.error(Field::Devices, {},
-                   fmt::format("there are {} devices; at most {} are allowed", devices.size(), kMaxDevices));
-  }
-  if (!devices.empty() && !workload.platform.clusters.empty()) {
-    findings.error(Field::Devices, Field::Clusters, "the platform has both devices and clusters",
-                   "no order of jobs spans two clusters: remove 'devices:' or 'clusters:'");
-  }
-  std::unordered_set<std::string_view> names;
-  for (std::size_t d = 0; d < devices.size(); ++d) {
-    const Device &device = devices[d];
-    if (const std::string why = name_mistake(device.name); !why.empty()) {
-      refuse(findings, Field::Devices, d, {}, fmt::format("the name {} of a device {}", in_quotes(device.name), why));
-    } else if (!names.insert(device.name).second) {
-      refuse(findings, Field::Devices, d, {}, fmt::format("the name '{}' is used by another device", device.name),
-             "choose a unique name for each device");
-    }
-    if (device.slots < 1 || device.slots > kMaxSlots) {
-      refuse(findings, Field::Devices, d, {},
-             fmt::format("slots of device '{}' must be from 1 to {}, not {}", device.name, kMaxSlots, device.slots));
-    }
-  }
-}
 
 void check_waits(const Workload &workload, const Task &task, bool allowed, FindingList &findings) {
   if (task.waits.empty()) return;

@@ -4,11 +4,6 @@
 #include "redag/loader/workload_yaml.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cerrno>
-#include <cstring>
-#include <fstream>
-#include <limits>
 #include <optional>
 #include <span>
 #include <unordered_map>
@@ -16,6 +11,7 @@
 
 #include <fmt/format.h>
 
+#include "redag/loader/fields.hpp"
 #include "redag/loader/hyperperiod_warning.hpp"
 #include "redag/loader/text_file.hpp"
 #include "redag/loader/validate.hpp"
@@ -28,30 +24,6 @@ namespace {
 
 using yaml::Node;
 
-constexpr std::array kTopFields = {Field::Name, Field::Platform, Field::Policy, Field::Ties, Field::Dags};
-constexpr std::array kPlatformFields = {Field::Workers, Field::Cpus, Field::Preemption, Field::Clusters,
-                                        Field::Devices};
-constexpr std::array kClusterFields = {Field::Name, Field::Workers, Field::Cpus};
-constexpr std::array kDagFields = {Field::Name,     Field::Cluster,   Field::Period,     Field::Rate,
-                                   Field::Deadline, Field::MaxActive, Field::MaxPending, Field::Criticality,
-                                   Field::Degrade,  Field::Edges,     Field::Tasks};
-constexpr std::array kTaskFields = {
-    Field::Name,       Field::Wcet,    Field::Bcet,     Field::Period,      Field::Deadline,  Field::Offset,
-    Field::Jitter,     Field::Region,  Field::Budget,   Field::Concurrency, Field::Group,     Field::Criticality,
-    Field::Activation, Field::After,   Field::Overrun,  Field::Priority,    Field::Execution, Field::Callback,
-    Field::OnBudget,   Field::WcetLow, Field::Segments, Field::Rate};
-
-/// `activation` in a file says what releases a task, and of a timer task whether it is a timer at all.
-enum class Released : std::uint8_t { ByTimer, ByData, ByEvent };
-constexpr std::array kReleased = {Released::ByTimer, Released::ByData, Released::ByEvent};
-const char *to_string(Released value) {
-  switch (value) {
-    case Released::ByData: return to_string(Activation::Data);
-    case Released::ByEvent: return kEventActivation;
-    case Released::ByTimer: break;
-  }
-  return to_string(Activation::Timer);
-}
 /// A map of the file, and which of its values could not be read. Findings that depend on those are not reported.
 struct Part {
   const Node *node = nullptr;
@@ -67,14 +39,6 @@ struct DagPart : Part {
 };
 
 const Node *find(const Part &part, Field field) { return yaml::find(*part.node, to_string(field)); }
-
-template <std::size_t N>
-std::vector<std::string_view> names_of(const std::array<Field, N> &fields) {
-  std::vector<std::string_view> names;
-  names.reserve(N);
-  for (const Field field : fields) names.emplace_back(to_string(field));
-  return names;
-}
 
 /// Turns one file into a workload: reads the tree, gathers all mistakes, then validates the whole by validate.hpp.
 class Reader : private yaml::ValueReader {
@@ -102,35 +66,18 @@ class Reader : private yaml::ValueReader {
  private:
   // --- keys of a part ---
 
-  /// Reads `field` of `part` with `read` into `out` if it is there. Notes a failure in `part`.
-  template <class T, class Read>
-  void take(Part &part, Field field, T &out, Read read) {
-    const Node *node = find(part, field);
-    if (node == nullptr) return;
-    if (auto value = read(*node, to_string(field))) {
-      out = std::move(*value);
-    } else {
-      part.broken |= field;
-    }
+  /// Reads the fields of a part that stand alone. Returns false if the part is no map.
+  template <const auto &rows, class Owner>
+  bool take_fields(Part &part, std::string_view what, Owner &owner) {
+    const bool is_map = check_map(*part.node, what, fields::keys_of<rows>());
+    part.broken |= is_map ? ValueReader::take_fields(*part.node, owner, rows) : fields::all_of(rows);
+    return is_map;
   }
 
-  void take_text(Part &part, Field field, std::string &out) {
-    take(part, field, out, [this](const Node &node, std::string_view key) { return text(node, key); });
-  }
-  void take_duration(Part &part, Field field, Duration &out) {
-    take(part, field, out, [this](const Node &node, std::string_view key) { return duration(node, key); });
-  }
-  /// For durations where 0 in the model means "not given".
-  void take_positive_duration(Part &part, Field field, Duration &out) {
-    take(part, field, out, [this](const Node &node, std::string_view key) { return positive_duration(node, key); });
-  }
-  void take_count(Part &part, Field field, std::uint32_t &out, std::uint32_t most) {
-    take(part, field, out,
-         [&](const Node &node, std::string_view key) { return integer<std::uint32_t>(node, key, 1, most); });
-  }
-  template <class Enum>
-  void take_enum(Part &part, Field field, Enum &out) {
-    take(part, field, out, [this](const Node &node, std::string_view key) { return one_of<Enum>(node, key); });
+  /// Reads a joint field by its type. Notes a failure in `part`.
+  template <class T>
+  void take(Part &part, Field field, T &out, std::int64_t least = 1, std::int64_t most = kMaxDuration) {
+    if (!ValueReader::take(*part.node, to_string(field), out, least, most)) part.broken |= field;
   }
 
   /// Returns the items of a list. The list may be absent or null: validate.hpp then reports what is missing.
@@ -151,11 +98,8 @@ class Reader : private yaml::ValueReader {
             "a workload needs at least one DAG with one task, see docs/workload_format.md");
       return;
     }
-    if (!check_map(*root_.node, "a workload", names_of(kTopFields))) return;
+    if (!take_fields<fields::kWorkload>(root_, "a workload", workload_)) return;
     structure_known_ = true;
-    take_text(root_, Field::Name, workload_.name);
-    take_enum(root_, Field::Policy, workload_.policy);
-    take_enum(root_, Field::Ties, workload_.ties);
     read_platform();
     const std::vector<Node> *dags = take_list(root_, Field::Dags);
     if (dags == nullptr) return;
@@ -168,25 +112,19 @@ class Reader : private yaml::ValueReader {
     workload_.platform.workers = options_.default_workers;
     platform_.node = find(root_, Field::Platform);
     if (platform_.node == nullptr) return;
-    if (!check_map(*platform_.node, "platform", names_of(kPlatformFields))) {
-      root_.broken |= FieldSet(Field::Workers) | Field::Preemption | Field::Clusters | Field::Devices | Field::Cpus;
-      return;
+    if (take_fields<fields::kPlatform>(platform_, "platform", workload_.platform)) {
+      take_workers(platform_, workload_.platform.workers, workload_.platform.cpus);
+      read_clusters();
     }
-    take_workers(platform_, workload_.platform.workers, workload_.platform.cpus);
-    read_clusters();
-    take_enum(platform_, Field::Preemption, workload_.platform.preemption);
-    take(platform_, Field::Devices, workload_.platform.devices,
-         [this](const Node &value, std::string_view) { return devices(value); });
     root_.broken |= platform_.broken;
   }
 
   /// Reads the number of workers and their processors. Processors alone mean one worker for each.
   void take_workers(Part &part, std::uint32_t &workers, std::vector<int> &cpus) {
-    take(part, Field::Cpus, cpus,
-         [this](const Node &value, std::string_view key) { return ValueReader::cpus(value, key); });
+    take(part, Field::Cpus, cpus);
     if (!cpus.empty()) workers = static_cast<std::uint32_t>(cpus.size());
     if (part.broken.intersects(Field::Cpus)) part.broken |= Field::Workers;
-    take_count(part, Field::Workers, workers, kMaxWorkers);
+    take(part, Field::Workers, workers, 1, kMaxWorkers);
   }
 
   void read_clusters() {
@@ -206,37 +144,18 @@ class Reader : private yaml::ValueReader {
     for (const Node &node : *nodes) {
       Part part{&node, {}};
       Cluster &cluster = clusters.emplace_back();
-      if (!check_map(node, "a cluster", names_of(kClusterFields))) {
-        platform_.broken |= Field::Clusters;
-        continue;
-      }
-      take_text(part, Field::Name, cluster.name);
-      take_workers(part, cluster.workers, cluster.cpus);
+      if (take_fields<fields::kCluster>(part, "a cluster", cluster)) take_workers(part, cluster.workers, cluster.cpus);
       workers += cluster.workers;
-      if (part.broken.intersects(FieldSet(Field::Name) | Field::Workers | Field::Cpus)) {
-        platform_.broken |= Field::Clusters;
-      }
+      if (part.broken.intersects(fields::all_of(fields::kCluster))) platform_.broken |= Field::Clusters;
     }
     if (!clusters.empty()) workload_.platform.workers = static_cast<std::uint32_t>(workers);
   }
 
   void read_dag(const Node &node, Dag &dag, DagPart &part) {
     part.node = &node;
-    static const std::vector<std::string_view> kKeys = names_of(kDagFields);
-    if (!check_map(node, "a DAG", kKeys)) {
-      for (const Field field : kDagFields) part.broken |= field;
-      return;
-    }
-    take_text(part, Field::Name, dag.name);
-    take_text(part, Field::Cluster, dag.cluster);
+    if (!take_fields<fields::kDag>(part, "a DAG", dag)) return;
     Duration period = 0;
     take_own_period(part, period, fmt::format("DAG '{}'", dag.name));
-    take_positive_duration(part, Field::Deadline, dag.deadline);
-    take_count(part, Field::MaxActive, dag.max_active, kMaxBound);
-    take_count(part, Field::MaxPending, dag.max_pending, kMaxBound);
-    take_enum(part, Field::Criticality, dag.criticality);
-    take_degrade(dag.degrade, part);
-    take_enum(part, Field::Edges, dag.edges);
     const std::vector<Node> *tasks = take_list(part, Field::Tasks);
     if (tasks == nullptr) return;
     dag.tasks.resize(tasks->size());
@@ -251,57 +170,41 @@ class Reader : private yaml::ValueReader {
 
   void read_task(const Node &node, Task &task, TaskPart &part) {
     part.node = &node;
-    static const std::vector<std::string_view> kKeys = names_of(kTaskFields);
-    if (!check_map(node, "a task", kKeys)) {
-      for (const Field field : kTaskFields) part.broken |= field;
-      return;
-    }
-    take_text(part, Field::Name, task.name);
+    if (!take_fields<fields::kTask>(part, "a task", task)) return;
     take_wcet(task, part);
-    take_duration(part, Field::Bcet, task.bcet);
-    take_positive_duration(part, Field::Deadline, task.deadline);
-    take_offset(task, part);
-    take_duration(part, Field::Jitter, task.jitter);
-    take_positive_duration(part, Field::Region, task.region);
-    take_positive_duration(part, Field::Budget, task.budget);
-    take_enum(part, Field::OnBudget, task.on_budget);
-    take_positive_duration(part, Field::WcetLow, task.wcet_low);
-    take_count(part, Field::Concurrency, task.concurrency, kMaxConcurrency);
-    take_text(part, Field::Group, task.group);
+    const Node *offset = find(part, Field::Offset);
+    if (offset != nullptr && offset->is(kAnyOffset)) {
+      task.phase = Phase::Unknown;
+    } else {
+      take(part, Field::Offset, task.offset, 0);
+    }
     take_criticality(task, part);
     take_activation(task, part);
-    take(part, Field::Priority, task.priority, [this](const Node &value, std::string_view key) {
-      return integer<int>(value, key, std::numeric_limits<int>::min());
-    });
     take_overrun(task, part);
-    if (find(part, Field::Bcet) != nullptr) task.execution.kind = ExecutionTime::Kind::Uniform;
-    take(part, Field::Execution, task.execution,
-         [this](const Node &value, std::string_view) { return execution(value); });
-    take(part, Field::Callback, task.callback, [this](const Node &value, std::string_view) { return callback(value); });
+    if (find(part, Field::Bcet) != nullptr && find(part, Field::Execution) == nullptr) {
+      task.execution.kind = ExecutionTime::Kind::Uniform;
+    }
   }
 
   void take_activation(Task &task, TaskPart &part) {
-    Released released = Released::ByTimer;
-    take(part, Field::Activation, released, [this](const Node &node, std::string_view key) {
-      return one_of(node, key, std::span<const Released>(kReleased));
-    });
-    if (released == Released::ByData) task.activation = Activation::Data;
-    if (released == Released::ByEvent) task.phase = Phase::Event;
-  }
-
-  void take_offset(Task &task, TaskPart &part) {
-    const Node *node = find(part, Field::Offset);
-    if (node != nullptr && node->kind == Node::Kind::Scalar && node->text == kAnyOffset) {
-      task.phase = Phase::Unknown;
+    const std::string_view timer = to_string(Activation::Timer);
+    const std::string_view data = to_string(Activation::Data);
+    const Node *node = find(part, Field::Activation);
+    if (node == nullptr || node->is(timer)) return;
+    if (node->is(data)) {
+      task.activation = Activation::Data;
+    } else if (node->is(kEventActivation)) {
+      task.phase = Phase::Event;
     } else {
-      take_duration(part, Field::Offset, task.offset);
+      unknown_choice(*node, to_string(Field::Activation), {timer, data, kEventActivation});
+      part.broken |= Field::Activation;
     }
   }
 
   /// The scheduler only uses the DAG's criticality. Warns if a task has another one, which would have no effect.
   void take_criticality(Task &task, TaskPart &part) {
     const Criticality of_dag = task.criticality;
-    take_enum(part, Field::Criticality, task.criticality);
+    take(part, Field::Criticality, task.criticality);
     if (task.criticality == of_dag) return;
     const Node &at = *find(part, Field::Criticality);
     diagnostics_.push_back(Diagnostic{Severity::Warning, file_, at.line, at.column,
@@ -313,12 +216,9 @@ class Reader : private yaml::ValueReader {
   void take_wcet(Task &task, TaskPart &part) {
     if (const Node *segments = find(part, Field::Segments)) return take_segments(*segments, task, part);
     const bool is_callback = find(part, Field::Callback) != nullptr;
-    if (is_callback && options_.wcet_optional) {
-      take_positive_duration(part, Field::Wcet, task.wcet);
-      return;
-    }
-    take_duration(part, Field::Wcet, task.wcet);
-    if (find(part, Field::Wcet) != nullptr) return;
+    const bool may_lack = is_callback && options_.wcet_optional;
+    take(part, Field::Wcet, task.wcet, may_lack ? 1 : 0);
+    if (may_lack || find(part, Field::Wcet) != nullptr) return;
     error(*part.node, fmt::format("task '{}' has no wcet", task.name),
           is_callback
               ? "run the node with learning and save the measured value, or add 'wcet:', the worst-case execution time"
@@ -345,7 +245,6 @@ class Reader : private yaml::ValueReader {
 
   /// Returns what states the period of this DAG or task itself: `period` or `rate`; null if nothing does.
   static const Node *own_period(const Part &part) {
-    if (part.node->kind != Node::Kind::Map) return nullptr;
     const Node *period = find(part, Field::Period);
     return period != nullptr ? period : find(part, Field::Rate);
   }
@@ -354,7 +253,7 @@ class Reader : private yaml::ValueReader {
   [[nodiscard]] bool is_rate(DagId dag, std::uint32_t task) const {
     const Node *own = own_period(dags_[dag.value].tasks[task]);
     const Part &holder = own != nullptr ? static_cast<const Part &>(dags_[dag.value].tasks[task]) : dags_[dag.value];
-    return holder.node->kind == Node::Kind::Map && find(holder, Field::Rate) != nullptr;
+    return find(holder, Field::Rate) != nullptr;
   }
 
   void take_own_period(Part &part, Duration &out, const std::string &whose) {
@@ -364,12 +263,12 @@ class Reader : private yaml::ValueReader {
       error(*rate, fmt::format("{} has both 'period' and 'rate'", whose), "remove one of them");
       part.broken |= Field::Period;
     } else if (rate != nullptr) {
-      take(part, Field::Rate, out,
-           [this](const Node &node, std::string_view key) { return ValueReader::rate(node, key); });
-      if (part.broken.intersects(Field::Rate)) part.broken |= Field::Period;
+      const std::optional<Duration> read = ValueReader::rate(*rate, to_string(Field::Rate));
+      if (!read) part.broken |= Field::Rate | Field::Period;
+      out = read.value_or(out);
     } else {
       const std::size_t mistakes = diagnostics_.size();
-      take_positive_duration(part, Field::Period, out);
+      take(part, Field::Period, out);
       if (diagnostics_.size() == mistakes) return;
       if (const Result<Duration> meant = parse_rate(period->text)) {
         diagnostics_.back().hint =
@@ -382,7 +281,7 @@ class Reader : private yaml::ValueReader {
   /// people who write `after: x` mean that `x` releases the task. The period of the DAG is a default of its timer tasks
   /// and does not say which these are. Descriptions of recorded runs keep the former rule (`timers_by_default`).
   bool is_data_by_default(const Task &task, const TaskPart &part) const {
-    if (options_.timers_by_default || part.node->kind != Node::Kind::Map) return false;
+    if (options_.timers_by_default) return false;
     const Node *after = find(part, Field::After);
     const bool has_predecessor = after != nullptr && after->kind != Node::Kind::Null &&
                                  (after->kind != Node::Kind::Sequence || !after->children.empty());
@@ -416,51 +315,18 @@ class Reader : private yaml::ValueReader {
 
   void take_overrun(Task &task, TaskPart &part) {
     const Node *node = find(part, Field::Overrun);
-    if (node == nullptr || (node->kind == Node::Kind::Scalar && node->text == "skip")) return;
-    if (node->kind == Node::Kind::Scalar && node->text == "queue") {
-      task.overrun = Overrun::Queue;
-    } else if (node->kind == Node::Kind::Map) {
-      task.overrun = Overrun::Queue;
-      check_map(*node, "overrun", {"queue"});
-      const Node *depth = yaml::find(*node, "queue");
-      if (depth == nullptr) {
-        error(*node, "overrun 'queue' needs a depth", "write {queue: 3}");
-      } else if (const auto value = integer<std::uint32_t>(*depth, "queue", 1, kMaxQueueDepth)) {
-        task.queue_depth = *value;
-        return;
-      }
-      part.broken |= Field::Overrun;
-    } else {
+    if (node == nullptr || node->is("skip")) return;
+    task.overrun = Overrun::Queue;
+    if (node->is("queue")) return;
+    const std::size_t mistakes = diagnostics_.size();
+    if (node->kind != Node::Kind::Map) {
       unknown_choice(*node, "overrun", {"skip", "queue", "{queue: N}"});
-      part.broken |= Field::Overrun;
+    } else {
+      check_map(*node, "overrun", {"queue"});
+      if (yaml::find(*node, "queue") == nullptr) error(*node, "overrun 'queue' needs a depth", "write {queue: 3}");
+      ValueReader::take(*node, "queue", task.queue_depth, 1, kMaxQueueDepth);
     }
-  }
-
-  void take_degrade(Degrade &degrade, DagPart &part) {
-    const Node *node = find(part, Field::Degrade);
-    if (node == nullptr || (node->kind == Node::Kind::Scalar && node->text == "stop")) return;
-    if (node->kind == Node::Kind::Map && check_map(*node, "degrade", {"skip", "stretch"})) {
-      const Node *skip = yaml::find(*node, "skip");
-      const Node *stretch = yaml::find(*node, "stretch");
-      if ((skip == nullptr) == (stretch == nullptr)) {
-        error(*node, "degrade must have either 'skip' or 'stretch'", "write {skip: 3} or {stretch: 2.5}");
-      } else if (skip != nullptr) {
-        degrade.kind = Degrade::Kind::Skip;
-        if (const auto value = integer<std::uint32_t>(*skip, "skip", 1, kMaxDegrade)) {
-          degrade.skip = *value;
-          return;
-        }
-      } else {
-        degrade.kind = Degrade::Kind::Stretch;
-        if (const auto value = real(*stretch, "stretch")) {
-          degrade.stretch = *value;
-          return;
-        }
-      }
-    } else if (node->kind != Node::Kind::Map) {
-      unknown_choice(*node, "degrade", {"stop", "{skip: N}", "{stretch: FACTOR}"});
-    }
-    part.broken |= Field::Degrade;
+    if (diagnostics_.size() > mistakes) part.broken |= Field::Overrun;
   }
 
   /// Turns names into indices, once all tasks of the DAG are known.
@@ -474,7 +340,7 @@ class Reader : private yaml::ValueReader {
     }
     for (std::uint32_t i = 0; i < dag.tasks.size(); ++i) {
       TaskPart &task = part.tasks[i];
-      const Node *after = task.node->kind == Node::Kind::Map ? find(task, Field::After) : nullptr;
+      const Node *after = find(task, Field::After);
       if (after == nullptr) continue;
       const bool list = after->kind == Node::Kind::Sequence;
       for (const Node &item : list ? std::span<const Node>(after->children) : std::span<const Node>(after, 1)) {
@@ -572,16 +438,9 @@ class Reader : private yaml::ValueReader {
   }
 
   const Node &place(const Finding &finding, const Part &part) const {
-    const bool of_platform = finding.field == Field::Workers || finding.field == Field::Preemption ||
-                             finding.field == Field::Clusters || finding.field == Field::Devices ||
-                             finding.field == Field::Cpus;
+    const bool of_platform = fields::all_of(fields::kPlatform).intersects(finding.field);
     const Part &holder = of_platform && platform_.node != nullptr ? platform_ : part;
-    const Node *value = nullptr;
-    if (finding.field == Field::Period) {
-      value = own_period(holder);
-    } else if (holder.node->kind == Node::Kind::Map) {
-      value = find(holder, finding.field);
-    }
+    const Node *value = finding.field == Field::Period ? own_period(holder) : find(holder, finding.field);
     if (value == nullptr) return *part.node;
     if (finding.item == Finding::kNone) return *value;
     if (finding.field == Field::Clusters) return value->children[finding.item];

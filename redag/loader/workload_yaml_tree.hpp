@@ -23,6 +23,8 @@ struct Node {
   int column = 0;              // from 1, in characters
   std::string text;            // of a scalar
   std::vector<Node> children;  // of a sequence: the items; of a map: key, value, key, value, ...
+
+  [[nodiscard]] bool is(std::string_view word) const { return kind == Kind::Scalar && text == word; }
 };
 
 /// The deepest nesting that is read. A workload needs seven levels.

@@ -4,7 +4,6 @@
 #include "redag/loader/workload_yaml_values.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <tuple>
 #include <utility>
@@ -19,26 +18,29 @@
 namespace redag::yaml {
 
 const Node *find(const Node &map, std::string_view key) {
+  if (map.kind != Node::Kind::Map) return nullptr;
   for (std::size_t i = 0; i + 1 < map.children.size(); i += 2) {
     if (map.children[i].text == key) return &map.children[i + 1];
   }
   return nullptr;
 }
 
-void ValueReader::error(const Node &at, std::string message, std::string hint) {
+std::nullopt_t ValueReader::error(const Node &at, std::string message, std::string hint) {
   diagnostics_.push_back(Diagnostic{Severity::Error, file_, at.line, at.column, std::move(message), std::move(hint)});
+  return std::nullopt;
 }
 
-void ValueReader::wrong_type(const Node &at, std::string_view key, std::string_view expected) {
-  error(at, fmt::format("{} must be {}, not {}", key, expected, describe(at)));
+std::nullopt_t ValueReader::wrong_type(const Node &at, std::string_view key, std::string_view expected) {
+  return error(at, fmt::format("{} must be {}, not {}", key, expected, describe(at)));
 }
 
-void ValueReader::wrong_number(const Node &at, std::string_view key, std::string_view expected) {
+std::nullopt_t ValueReader::wrong_number(const Node &at, std::string_view key, std::string_view expected) {
   wrong_type(at, key, expected);
   const bool is_number = !at.text.empty() && at.text.find_first_not_of("0123456789.-") == std::string::npos;
-  if (at.kind != Node::Kind::Scalar || !at.quoted || !is_number) return;
+  if (at.kind != Node::Kind::Scalar || !at.quoted || !is_number) return std::nullopt;
   diagnostics_.back().message += " in quotes, which make it a text";
   diagnostics_.back().hint = fmt::format("write '{}: {}'", key, at.text);
+  return std::nullopt;
 }
 
 std::string ValueReader::did_you_mean(std::string_view name, const std::vector<std::string_view> &candidates,
@@ -93,10 +95,7 @@ Diagnostics ValueReader::take_diagnostics() {
 }
 
 std::optional<Duration> ValueReader::duration(const Node &node, std::string_view key) {
-  if (node.kind != Node::Kind::Scalar) {
-    wrong_type(node, key, "a duration such as 5ms");
-    return std::nullopt;
-  }
+  if (node.kind != Node::Kind::Scalar) return wrong_type(node, key, "a duration such as 5ms");
   Result<Duration> value = parse_duration(node.text);
   if (value) return *value;
   for (const Diagnostic &why : value.error()) error(node, fmt::format("{}: {}", key, why.message), why.hint);
@@ -104,10 +103,7 @@ std::optional<Duration> ValueReader::duration(const Node &node, std::string_view
 }
 
 std::optional<Duration> ValueReader::rate(const Node &node, std::string_view key) {
-  if (node.kind != Node::Kind::Scalar) {
-    wrong_type(node, key, "a rate such as 30Hz");
-    return std::nullopt;
-  }
+  if (node.kind != Node::Kind::Scalar) return wrong_type(node, key, "a rate such as 30Hz");
   Result<Duration> period = parse_rate(node.text);
   if (period) return *period;
   const bool is_duration = parse_duration(node.text).has_value();
@@ -119,31 +115,21 @@ std::optional<Duration> ValueReader::rate(const Node &node, std::string_view key
 }
 
 std::optional<Duration> ValueReader::positive_duration(const Node &node, std::string_view key) {
-  std::optional<Duration> value = duration(node, key);
-  if (value && *value <= 0) {
-    error(node, fmt::format("{} must be greater than zero, not {}", key, describe(node)));
-    value.reset();
-  }
-  return value;
+  const std::optional<Duration> value = duration(node, key);
+  if (!value || *value > 0) return value;
+  return error(node, fmt::format("{} must be greater than zero, not {}", key, describe(node)));
 }
 
 std::optional<Duration> ValueReader::duration_from_zero(const Node &node, std::string_view key) {
-  std::optional<Duration> value = duration(node, key);
-  if (value && *value < 0) {
-    error(node, fmt::format("{} must not be negative, not {}", key, describe(node)));
-    value.reset();
-  }
-  return value;
+  const std::optional<Duration> value = duration(node, key);
+  if (!value || *value >= 0) return value;
+  return error(node, fmt::format("{} must not be negative, not {}", key, describe(node)));
 }
 
 std::optional<std::string> ValueReader::text(const Node &node, std::string_view key) {
-  if (node.kind != Node::Kind::Scalar || node.text.empty()) {
-    wrong_type(node, key, "a non-empty string");
-    return std::nullopt;
-  }
+  if (node.kind != Node::Kind::Scalar || node.text.empty()) return wrong_type(node, key, "a non-empty string");
   if (const std::string why = name_mistake(node.text); !why.empty()) {
-    error(node, fmt::format("{} {} {}", key, describe(node), why));
-    return std::nullopt;
+    return error(node, fmt::format("{} {} {}", key, describe(node), why));
   }
   return node.text;
 }
@@ -155,13 +141,14 @@ std::optional<double> ValueReader::real(const Node &node, std::string_view key) 
     const auto [used, code] = std::from_chars(node.text.data(), end, value);
     if (code == std::errc() && used == end && std::isfinite(value)) return value;
   }
-  wrong_number(node, key, "a number such as 2.5");
-  return std::nullopt;
+  return wrong_number(node, key, "a number such as 2.5");
 }
 
-void ValueReader::unknown_choice(const Node &node, std::string_view key, const std::vector<std::string_view> &names) {
+std::nullopt_t ValueReader::unknown_choice(const Node &node, std::string_view key,
+                                           const std::vector<std::string_view> &names) {
   wrong_type(node, key, fmt::format("one of {}", fmt::join(names, ", ")));
   if (node.kind == Node::Kind::Scalar) diagnostics_.back().hint = did_you_mean(node.text, names, "");
+  return std::nullopt;
 }
 
 std::optional<std::vector<int>> ValueReader::cpus(const Node &node, std::string_view key) {
@@ -176,51 +163,59 @@ std::optional<std::vector<int>> ValueReader::cpus(const Node &node, std::string_
 
 std::optional<ExecutionTime> ValueReader::execution(const Node &node) {
   using Kind = ExecutionTime::Kind;
-  ExecutionTime model;
-  if (node.kind == Node::Kind::Scalar && (node.text == "constant" || node.text == "uniform")) {
-    model.kind = node.text == "constant" ? Kind::Constant : Kind::Uniform;
-    return model;
-  }
+  if (node.is("constant")) return ExecutionTime{};
+  if (node.is("uniform")) return ExecutionTime{Kind::Uniform, 0, 0, {}};
   if (node.kind != Node::Kind::Map) {
-    unknown_choice(node, "execution", {"constant", "uniform", "{normal: {mean, stddev}}", "{empirical: [durations]}"});
-    return std::nullopt;
+    return unknown_choice(node, "execution",
+                          {"constant", "uniform", "{normal: {mean, stddev}}", "{empirical: [durations]}"});
   }
   check_map(node, "execution", {"normal", "empirical"});
   const Node *normal = find(node, "normal");
   const Node *empirical = find(node, "empirical");
-  if ((normal == nullptr) == (empirical == nullptr)) {
-    error(node, "execution must have either 'normal' or 'empirical'");
-    return std::nullopt;
-  }
+  if ((normal == nullptr) == (empirical == nullptr))
+    return error(node, "execution must have either 'normal' or 'empirical'");
   return normal != nullptr ? normal_execution(*normal) : empirical_execution(*empirical);
 }
 
 std::optional<ExecutionTime> ValueReader::normal_execution(const Node &node) {
   if (!check_map(node, "normal", {"mean", "stddev"})) return std::nullopt;
-  std::array<std::optional<Duration>, 2> values;
-  constexpr std::array<std::string_view, 2> kKeys = {"mean", "stddev"};
-  for (std::size_t i = 0; i < kKeys.size(); ++i) {
-    if (const Node *value = find(node, kKeys[i])) {
-      values[i] = duration(*value, kKeys[i]);
-    } else {
-      error(node, fmt::format("normal has no {}", kKeys[i]));
-    }
+  const std::size_t mistakes = diagnostics_.size();
+  ExecutionTime model{ExecutionTime::Kind::Normal, 0, 0, {}};
+  for (const auto &[key, member] : {std::pair{"mean", &ExecutionTime::mean}, {"stddev", &ExecutionTime::stddev}}) {
+    if (find(node, key) == nullptr) error(node, fmt::format("normal has no {}", key));
+    take(node, key, model.*member, 0);
   }
-  if (!values[0] || !values[1]) return std::nullopt;
-  return ExecutionTime{ExecutionTime::Kind::Normal, *values[0], *values[1], {}};
+  if (diagnostics_.size() > mistakes) return std::nullopt;
+  return model;
 }
 
 std::optional<ExecutionTime> ValueReader::empirical_execution(const Node &node) {
-  if (node.kind != Node::Kind::Sequence) {
-    wrong_type(node, "empirical", "a list of durations");
-    return std::nullopt;
-  }
+  if (node.kind != Node::Kind::Sequence) return wrong_type(node, "empirical", "a list of durations");
   ExecutionTime model{ExecutionTime::Kind::Empirical, 0, 0, {}};
   for (const Node &item : node.children) {
     if (const auto sample = duration(item, "empirical")) model.samples.push_back(*sample);
   }
   if (model.samples.size() != node.children.size()) return std::nullopt;
   return model;
+}
+
+std::optional<Degrade> ValueReader::degrade(const Node &node) {
+  if (node.is("stop")) return Degrade{};
+  if (node.kind != Node::Kind::Map) {
+    return unknown_choice(node, "degrade", {"stop", "{skip: N}", "{stretch: FACTOR}"});
+  }
+  check_map(node, "degrade", {"skip", "stretch"});
+  const Node *skip = find(node, "skip");
+  const Node *stretch = find(node, "stretch");
+  if ((skip == nullptr) == (stretch == nullptr)) {
+    error(node, "degrade must have either 'skip' or 'stretch'", "write {skip: 3} or {stretch: 2.5}");
+  } else if (skip != nullptr) {
+    const auto count = integer<std::uint32_t>(*skip, "skip", 1, kMaxDegrade);
+    if (count) return Degrade{.kind = Degrade::Kind::Skip, .skip = *count};
+  } else if (const auto factor = real(*stretch, "stretch")) {
+    return Degrade{.kind = Degrade::Kind::Stretch, .stretch = *factor};
+  }
+  return std::nullopt;
 }
 
 }  // namespace redag::yaml

@@ -108,8 +108,8 @@ class FactorialReader : private PlanReader {
                 take(node, "name", name);
                 if (const Node *file = find(node, "file")) return load(*file, std::move(name));
                 if (const Node *random = find(node, "random")) return read_random(*random, std::move(name));
-                error(node, "a workload is a file, or random", "write, for example, {name: cart, file: cart.yaml}");
-                return std::nullopt;
+                return error(node, "a workload is a file, or random",
+                             "write, for example, {name: cart, file: cart.yaml}");
               });
   }
 
@@ -127,8 +127,7 @@ class FactorialReader : private PlanReader {
     if (name.empty()) name = path.stem().string();
     // The workers of a workload are a factor of the experiment.
     if (const Result<void> one = refuse_clusters(loaded->workload, "an experiment"); !one) {
-      error(node, one.error().front().message, one.error().front().hint);
-      return std::nullopt;
+      return error(node, one.error().front().message, one.error().front().hint);
     }
     return WorkloadSource{std::move(name), std::move(loaded->workload), std::nullopt};
   }

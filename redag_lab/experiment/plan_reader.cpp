@@ -39,8 +39,9 @@ void PlanReader::take_range(const char *key, std::vector<std::uint32_t> &out) {
   take_with(*node, "to", to, millionths);
   take_with(*node, "step", step, millionths);
   if (from == 0 || step == 0 || from > to || (to - from) / step > kMostLevels) {
-    return error(*node, fmt::format("{} is not a range of at most {} values", key, kMostLevels),
-                 "write, for example, {from: 0.05, to: 1, step: 0.05}");
+    error(*node, fmt::format("{} is not a range of at most {} values", key, kMostLevels),
+          "write, for example, {from: 0.05, to: 1, step: 0.05}");
+    return;
   }
   out.clear();
   for (std::uint64_t value = from; value <= to; value += step) out.push_back(static_cast<std::uint32_t>(value));

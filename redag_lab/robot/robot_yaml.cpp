@@ -248,9 +248,8 @@ class RobotReader : private yaml::ValueReader {
     std::vector<std::string_view> names;
     for (const auto &[each, place] : tasks_) names.emplace_back(each);
     std::sort(names.begin(), names.end());
-    error(node, fmt::format("there is no task {}", in_quotes(*name)),
-          did_you_mean(*name, names, "write PROCESS.DAG.TASK, such as 'base.control.pid'"));
-    return std::nullopt;
+    return error(node, fmt::format("there is no task {}", in_quotes(*name)),
+                 did_you_mean(*name, names, "write PROCESS.DAG.TASK, such as 'base.control.pid'"));
   }
 
   // ---- threads ----
