@@ -6,11 +6,13 @@
 #include <cstring>
 #include <fstream>
 #include <optional>
+#include <type_traits>
 
 #include <fmt/format.h>
 
 #include "redag/base/check.hpp"
 #include "redag/base/cpu_list.hpp"
+#include "redag/loader/fields.hpp"
 #include "redag/loader/hyperperiod_warning.hpp"
 #include "redag/loader/text_file.hpp"
 #include "redag/loader/validate.hpp"
@@ -24,9 +26,23 @@ using yaml::Writer;
 using Kind = ExecutionTime::Kind;
 using Layout = Writer::Layout;
 
-void write(Writer &out, Field field, std::string_view value) { out.write(to_string(field), value); }
+constexpr auto kNone = [](Field) { return false; };
 
-void write(Writer &out, Field field, std::uint32_t value) { out.write(to_string(field), std::uint64_t{value}); }
+/// Writes a part in the order of its rows: each field as `write_own` does, which returns false for one that it does not
+/// know; then by its type, if it does not have its default.
+template <class Owner, class Rows, class WriteOwn>
+void write_fields(Writer &out, const Owner &owner, const Rows &rows, const WriteOwn &write_own) {
+  static const Owner defaults;
+  fields::for_each(rows, [&](const auto &row) {
+    if (write_own(row.field)) return;
+    if constexpr (requires { fields::text_of(owner.*row.member); }) {
+      const auto &value = owner.*row.member;
+      if (row.rule.is_stated || value != defaults.*row.member) out.write(row.key, fields::text_of(value));
+    }
+  });
+}
+
+void write(Writer &out, Field field, std::string_view value) { out.write(to_string(field), value); }
 
 void write_duration(Writer &out, Field field, Duration value) {
   if (value != 0) write(out, field, format_duration(value));
@@ -138,7 +154,9 @@ void write_segments(Writer &out, const Platform &platform, const Task &task) {
   out.end_list();
 }
 
-void write_callback(Writer &out, const Callback &callback) {
+void write_callback(Writer &out, const Task &task) {
+  if (!task.callback) return;
+  const Callback &callback = *task.callback;
   out.text(to_string(Field::Callback));
   out.begin_map();
   out.write("node", callback.node);
@@ -159,92 +177,87 @@ void write_callback(Writer &out, const Callback &callback) {
 void write_task(Writer &out, const Platform &platform, const Dag &dag, const Task &task, Duration dag_period) {
   const bool has_timer = task.callback && task.callback->period != 0;
   const Duration implied_period = has_timer ? task.callback->period : dag_period;
-  out.begin_map(Layout::OneLine);
-  write(out, Field::Name, task.name);
-  if (task.waits.empty()) {
-    write_duration(out, Field::Wcet, task.wcet);
-  } else {
-    write_segments(out, platform, task);
-  }
-  write_duration(out, Field::WcetLow, task.wcet_low);
-  write_duration(out, Field::Bcet, task.bcet);
-  write_execution(out, task);
   const bool is_data = task.activation == Activation::Data;
   const bool has_period = !is_data && task.period != implied_period;
   const bool is_timer_callback = task.callback && task.callback->kind == Callback::Kind::Timer;
   // Predecessors alone would mean a data task, which is stated too, for readers of earlier versions.
-  if (is_data || (!task.predecessors.empty() && !has_period && !is_timer_callback)) {
-    write(out, Field::Activation, to_string(task.activation));
-  }
-  if (has_period) write_period(out, task.period);
-  if (task.phase == Phase::Event) write(out, Field::Activation, kEventActivation);
-  if (task.deadline != task.period) write_duration(out, Field::Deadline, task.deadline);
-  if (task.phase == Phase::Unknown) write(out, Field::Offset, kAnyOffset);
-  write_duration(out, Field::Offset, task.offset);
-  write_duration(out, Field::Jitter, task.jitter);
-  write_duration(out, Field::Region, task.region);
-  write_duration(out, Field::Budget, task.budget);
-  if (task.on_budget != OnBudget::Abort) write(out, Field::OnBudget, to_string(task.on_budget));
-  if (task.criticality != dag.criticality) write(out, Field::Criticality, to_string(task.criticality));
-  write_edges(out, dag, task);
-  if (task.concurrency != 1) write(out, Field::Concurrency, task.concurrency);
-  if (!task.group.empty()) write(out, Field::Group, task.group);
-  write_overrun(out, task);
-  if (task.priority) write(out, Field::Priority, std::to_string(*task.priority));
-  if (task.callback) write_callback(out, *task.callback);
+  const bool has_activation = is_data || (!task.predecessors.empty() && !has_period && !is_timer_callback);
+  out.begin_map(Layout::OneLine);
+  write_fields(out, task, fields::kTask, [&](Field field) {
+    switch (field) {
+      case Field::Wcet:  // or the segments in its place
+        if (task.waits.empty()) return false;
+        write_segments(out, platform, task);
+        break;
+      case Field::Execution: write_execution(out, task); break;
+      case Field::Activation:
+        if (has_activation) write(out, field, to_string(task.activation));
+        if (task.phase == Phase::Event) write(out, field, kEventActivation);
+        break;
+      case Field::Period:
+        if (has_period) write_period(out, task.period);
+        break;
+      case Field::Deadline: return task.deadline == task.period;
+      case Field::Offset:
+        if (task.phase == Phase::Unknown) write(out, field, kAnyOffset);
+        return false;
+      case Field::Criticality:
+        if (task.criticality != dag.criticality) write(out, field, to_string(task.criticality));
+        break;
+      case Field::After: write_edges(out, dag, task); break;
+      case Field::Overrun: write_overrun(out, task); break;
+      case Field::Callback: write_callback(out, task); break;
+      default: return false;
+    }
+    return true;
+  });
   out.end_map();
 }
 
-void write_workers(Writer &out, std::uint32_t workers, const std::vector<int> &cpus) {
-  write(out, Field::Workers, workers);
-  if (!cpus.empty()) write(out, Field::Cpus, format_cpu_list(cpus));
+void write_clusters(Writer &out, const std::vector<Cluster> &clusters) {
+  out.text(to_string(Field::Clusters));
+  out.begin_list();
+  for (const Cluster &cluster : clusters) {
+    out.begin_map(Layout::OneLine);
+    write_fields(out, cluster, fields::kCluster, kNone);
+    out.end_map();
+  }
+  out.end_list();
+}
+
+void write_devices(Writer &out, const std::vector<Device> &devices) {
+  if (devices.empty()) return;
+  out.text(to_string(Field::Devices));
+  out.begin_map();
+  for (const Device &device : devices) {
+    out.text(device.name);
+    out.begin_map(Layout::OneLine);
+    write_fields(out, device, fields::kDevice, kNone);
+    out.end_map();
+  }
+  out.end_map();
 }
 
 void write_platform(Writer &out, const Platform &platform) {
+  const bool has_clusters = !platform.clusters.empty();
   out.text(to_string(Field::Platform));
-  const bool is_short = platform.clusters.empty() && platform.devices.empty();
-  out.begin_map(is_short ? Layout::OneLine : Layout::Lines);
-  if (platform.clusters.empty()) {
-    write_workers(out, platform.workers, platform.cpus);
-  } else {
-    out.text(to_string(Field::Clusters));
-    out.begin_list();
-    for (const Cluster &cluster : platform.clusters) {
-      out.begin_map(Layout::OneLine);
-      write(out, Field::Name, cluster.name);
-      write_workers(out, cluster.workers, cluster.cpus);
-      out.end_map();
-    }
-    out.end_list();
-  }
-  write(out, Field::Preemption, to_string(platform.preemption));
-  if (!platform.devices.empty()) {
-    out.text(to_string(Field::Devices));
-    out.begin_map();
-    for (const Device &device : platform.devices) {
-      out.text(device.name);
-      out.begin_map(Layout::OneLine);
-      out.write("slots", device.slots);
-      out.write("queue", to_string(device.queue));
-      out.end_map();
-    }
-    out.end_map();
-  }
+  out.begin_map(has_clusters || !platform.devices.empty() ? Layout::Lines : Layout::OneLine);
+  write_fields(out, platform, fields::kPlatform, [&](Field field) {
+    if (field == Field::Clusters && has_clusters) write_clusters(out, platform.clusters);
+    if (field == Field::Devices) write_devices(out, platform.devices);
+    return has_clusters && (field == Field::Workers || field == Field::Cpus);
+  });
   out.end_map();
 }
 
 void write_dag(Writer &out, const Platform &platform, const Dag &dag) {
   const Duration period = common_period(dag);
   out.begin_map();
-  write(out, Field::Name, dag.name);
-  if (!dag.cluster.empty()) write(out, Field::Cluster, dag.cluster);
-  write_period(out, period);
-  write_duration(out, Field::Deadline, dag.deadline);
-  if (dag.max_active != 0) write(out, Field::MaxActive, dag.max_active);
-  if (dag.max_pending != 0) write(out, Field::MaxPending, dag.max_pending);
-  if (dag.criticality != Criticality::Normal) write(out, Field::Criticality, to_string(dag.criticality));
-  write_degrade(out, dag.degrade);
-  if (dag.edges != Edges::Executed) write(out, Field::Edges, to_string(dag.edges));
+  write_fields(out, dag, fields::kDag, [&](Field field) {
+    if (field == Field::Period) write_period(out, period);
+    if (field == Field::Degrade) write_degrade(out, dag.degrade);
+    return false;
+  });
   out.text(to_string(Field::Tasks));
   out.begin_list();
   for (const Task &task : dag.tasks) write_task(out, platform, dag, task, period);
@@ -257,10 +270,10 @@ void write_dag(Writer &out, const Platform &platform, const Dag &dag) {
 std::string to_yaml(const Workload &workload) {
   Writer out;
   out.begin_map();
-  if (!workload.name.empty()) write(out, Field::Name, workload.name);
-  write_platform(out, workload.platform);
-  write(out, Field::Policy, to_string(workload.policy));
-  if (workload.ties != Ties::Share) write(out, Field::Ties, to_string(workload.ties));
+  write_fields(out, workload, fields::kWorkload, [&](Field field) {
+    if (field == Field::Platform) write_platform(out, workload.platform);
+    return false;
+  });
   out.text(to_string(Field::Dags));
   out.begin_list();
   for (const Dag &dag : workload.dags) write_dag(out, workload.platform, dag);

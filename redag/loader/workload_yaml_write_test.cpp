@@ -4,6 +4,7 @@
 // What to_yaml() writes is read as it was; files damaged at random are refused, not crashed on.
 #include "redag/loader/workload_yaml.hpp"
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -42,6 +43,31 @@ void add_clusters(Workload &workload) {
     for (Task &task : dag.tasks) {
       if (!task.group.empty()) task.group += dag.cluster;
     }
+  }
+}
+
+/// Lets some tasks wait for devices, or for nothing that is named.
+void add_devices(Workload &workload) {
+  workload.platform.devices = {Device{"gpu", 1, Device::Queue::Fifo}, Device{"- a: b", kMaxSlots, {}}};
+  for (Dag &dag : workload.dags) {
+    for (Task &task : dag.tasks) {
+      if (task.wcet < 3 || *rc::gen::arbitrary<bool>()) continue;
+      task.waits = {Wait{.after = 1, .longest = 5, .shortest = *rc::gen::element<Duration>(0, 1, 5), .device = {}}};
+      task.waits.push_back(
+          Wait{.after = 2, .longest = kMicrosecond, .shortest = 0, .device = DeviceId(*rc::gen::element(0U, 1U))});
+    }
+  }
+}
+
+/// Releases some sources by events, or at any offset. Timer tasks with predecessors would need theirs to be common.
+void add_phases(Dag &dag) {
+  const auto joins = [](const Task &task) {
+    return task.activation == Activation::Timer && !task.predecessors.empty();
+  };
+  if (std::any_of(dag.tasks.begin(), dag.tasks.end(), joins)) return;
+  for (Task &task : dag.tasks) {
+    if (task.activation == Activation::Data || task.offset != 0) continue;
+    task.phase = *rc::gen::element(Phase::Common, Phase::Unknown, Phase::Event);
   }
 }
 
@@ -99,7 +125,12 @@ Workload arbitrary_workload() {
       }
     }
   }
-  if (*rc::gen::arbitrary<bool>()) add_clusters(workload);
+  for (Dag &dag : workload.dags) add_phases(dag);
+  if (*rc::gen::arbitrary<bool>()) {
+    add_clusters(workload);
+  } else if (*rc::gen::arbitrary<bool>()) {
+    add_devices(workload);
+  }
   return workload;
 }
 
@@ -143,7 +174,7 @@ TEST(ToYaml, WritesTheKindOfDegradationAndNotWhatAnotherKindWouldUse) {
 RC_GTEST_PROP(ToYaml, RoundTrips, ()) {
   const Workload workload = arbitrary_workload();
   const std::string text = to_yaml(workload);
-  const Result<LoadedWorkload> loaded = parse_workload(text, "round.yaml");
+  const Result<LoadedWorkload> loaded = parse_workload(text, "round.yaml", {.waits = true});
   if (!loaded) RC_FAIL(to_string(loaded.error()) + "\n" + text);
   RC_ASSERT(loaded->workload == workload);
 }
@@ -154,10 +185,12 @@ RC_GTEST_PROP(ToYaml, RoundTripsWithoutWcets, ()) {
     for (Task &task : dag.tasks) {
       if (!task.callback || *rc::gen::arbitrary<bool>()) continue;
       task.wcet = task.bcet = 0;
+      task.waits.clear();
       task.execution = {};
     }
   }
-  const Result<LoadedWorkload> loaded = parse_workload(to_yaml(workload), "round.yaml", {.wcet_optional = true});
+  const Result<LoadedWorkload> loaded =
+      parse_workload(to_yaml(workload), "round.yaml", {.wcet_optional = true, .waits = true});
   if (!loaded) RC_FAIL(to_string(loaded.error()) + "\n" + to_yaml(workload));
   RC_ASSERT(loaded->workload == workload);
 }
