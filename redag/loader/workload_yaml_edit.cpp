@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "redag/base/text.hpp"
+#include "redag/loader/fields.hpp"
 #include "redag/loader/workload_yaml_values.hpp"
 #include "redag/loader/yaml_writer.hpp"
 
@@ -136,38 +137,48 @@ class Editor {
   std::vector<Edit> edits_;
 };
 
-std::optional<std::string> count_text(std::uint32_t count) {
-  return count == 0 ? std::nullopt : std::optional(std::to_string(count));
+struct Change {
+  Field field;
+  std::optional<std::string> value;  // empty: without the key, the member has its default
+};
+
+/// Returns the fields of a part that differ: those that stand alone, and the number of workers.
+template <class Owner, class Rows>
+std::vector<Change> changes_of(const Owner &is, const Owner &wanted, const Rows &rows) {
+  std::vector<Change> changes;
+  fields::for_each(rows, [&](const auto &row) {
+    if constexpr (requires { fields::text_of(wanted.*row.member); }) {
+      const auto &value = wanted.*row.member;
+      if (is.*row.member == value || (row.rule.is_joint && row.field != Field::Workers)) return;
+      const bool is_absent = row.absent != nullptr && value == Owner{}.*row.member;
+      changes.push_back({row.field, is_absent ? std::nullopt : std::optional(fields::text_of(value))});
+    }
+  });
+  return changes;
+}
+
+template <class Owner, class Rows>
+void edit(Editor &editor, const Node &node, const Owner &is, const Owner &wanted, const Rows &rows) {
+  for (const Change &change : changes_of(is, wanted, rows)) editor.set(node, change.field, change.value);
 }
 
 void edit_platform(Editor &editor, const Node &root, const Platform &is, const Platform &wanted) {
-  const bool workers = is.clusters.empty() && is.workers != wanted.workers;
-  const bool preemption = is.preemption != wanted.preemption;
-  if (!workers && !preemption) return;
   const Node *node = yaml::find(root, to_string(Field::Platform));
-  if (node != nullptr && !node->children.empty()) {
-    if (workers) editor.set(*node, Field::Workers, std::to_string(wanted.workers));
-    if (preemption) editor.set(*node, Field::Preemption, to_string(wanted.preemption));
-    return;
-  }
-  if (node != nullptr) throw CannotEdit{};
+  if (node != nullptr && !node->children.empty()) return edit(editor, *node, is, wanted, fields::kPlatform);
   std::string values;
-  if (workers) values = "workers: " + std::to_string(wanted.workers);
-  if (preemption) values += (workers ? ", preemption: " : "preemption: ") + std::string(to_string(wanted.preemption));
-  editor.insert(root, "platform: {" + values + "}");
+  for (const Change &change : changes_of(is, wanted, fields::kPlatform)) {
+    if (node != nullptr || !change.value) throw CannotEdit{};
+    values += (values.empty() ? "" : ", ") + std::string(to_string(change.field)) + ": " + as_scalar(*change.value);
+  }
+  if (!values.empty()) editor.insert(root, "platform: {" + values + "}");
 }
 
 void edit_dag(Editor &editor, const Node &node, const Dag &is, const Dag &wanted) {
-  if (is.max_active != wanted.max_active) editor.set(node, Field::MaxActive, count_text(wanted.max_active));
-  if (is.cluster != wanted.cluster) {
-    editor.set(node, Field::Cluster, wanted.cluster.empty() ? std::nullopt : std::optional(wanted.cluster));
-  }
+  edit(editor, node, is, wanted, fields::kDag);
   const Node *tasks = yaml::find(node, to_string(Field::Tasks));
   if (tasks == nullptr || wanted.tasks.size() != tasks->children.size()) throw CannotEdit{};
   for (std::size_t i = 0; i < wanted.tasks.size(); ++i) {
-    const std::optional<int> &priority = wanted.tasks[i].priority;
-    if (is.tasks[i].priority == priority) continue;
-    editor.set(tasks->children[i], Field::Priority, priority ? std::optional(std::to_string(*priority)) : std::nullopt);
+    edit(editor, tasks->children[i], is.tasks[i], wanted.tasks[i], fields::kTask);
   }
 }
 
@@ -175,8 +186,7 @@ std::string edited(std::string_view text, const Node &root, const Workload &is, 
   Editor editor(text);
   // What is inserted at one place stays in this order.
   edit_platform(editor, root, is.platform, wanted.platform);
-  if (is.policy != wanted.policy) editor.set(root, Field::Policy, to_string(wanted.policy));
-  if (is.ties != wanted.ties) editor.set(root, Field::Ties, to_string(wanted.ties));
+  edit(editor, root, is, wanted, fields::kWorkload);
   const Node *dags = yaml::find(root, to_string(Field::Dags));
   if (dags == nullptr || dags->children.size() != wanted.dags.size()) throw CannotEdit{};
   for (std::size_t d = 0; d < wanted.dags.size(); ++d) edit_dag(editor, dags->children[d], is.dags[d], wanted.dags[d]);

@@ -14,8 +14,8 @@
 namespace redag {
 
 /// Returns `text`, a workload file, changed to state `wanted`: byte for byte the same if it already does. In place are
-/// changed: workers and preemption of the platform, policy, ties, and max_active, clusters and priorities. For another
-/// difference, and for text that is no workload, returns to_yaml(wanted). Requires that `wanted` is valid.
+/// changed the number of workers, and fields that stand alone (fields.hpp). For another difference, and for text that
+/// is no workload, returns to_yaml(wanted). Requires that `wanted` is valid.
 [[nodiscard]] std::string edit_yaml(std::string_view text, const Workload &wanted, LoadOptions options = {});
 
 /// Returns the line, from 1, on which `text` states a key of a DAG, or of its task with the number `task` in that DAG.
