@@ -3,6 +3,11 @@
 
 #include "redag/loader/calibration.hpp"
 
+#include <array>
+#include <limits>
+#include <utility>
+#include <vector>
+
 #include <fmt/format.h>
 
 #include "redag/loader/text_file.hpp"
@@ -17,6 +22,14 @@ using yaml::Node;
 using yaml::Writer;
 
 constexpr std::size_t kMaxBytes = std::size_t{1} << 20U;
+
+constexpr std::array<std::pair<const char *, std::string Calibration::*>, 6> kProvenanceTexts = {
+    {{"date", &Calibration::date},
+     {"host", &Calibration::host},
+     {"kernel", &Calibration::kernel},
+     {"processor", &Calibration::processor},
+     {"rights", &Calibration::rights},
+     {"version", &Calibration::version}}};
 
 class OverheadsReader : private yaml::ValueReader {
  public:
@@ -42,7 +55,7 @@ class OverheadsReader : private yaml::ValueReader {
     if (!check_map(*node, "overheads", {"realtime", "normal"})) return;
     if (const Node *one = find(*node, "realtime")) calibration_.realtime = read_class(*one, "realtime");
     if (const Node *one = find(*node, "normal")) calibration_.normal = read_class(*one, "normal");
-    if (find(*node, "realtime") == nullptr && find(*node, "normal") == nullptr) {
+    if (!calibration_.realtime && !calibration_.normal) {
       error(*node, "overheads must have 'realtime', 'normal', or both");
     }
   }
@@ -69,28 +82,12 @@ class OverheadsReader : private yaml::ValueReader {
   void read_provenance() {
     const Node *node = find(root_, "provenance");
     if (node == nullptr) return;
-    if (!check_map(
-            *node, "provenance",
-            {"date", "host", "kernel", "processor", "processors", "rights", "duration", "complete", "version"})) {
-      return;
-    }
-    const auto take_text = [&](const char *key, std::string &out) {
-      const Node *value = find(*node, key);
-      if (value == nullptr) return;
-      if (const std::optional<std::string> read = text(*value, key)) out = *read;
-    };
-    take_text("date", calibration_.date);
-    take_text("host", calibration_.host);
-    take_text("kernel", calibration_.kernel);
-    take_text("processor", calibration_.processor);
-    take_text("rights", calibration_.rights);
-    take_text("version", calibration_.version);
-    if (const Node *value = find(*node, "processors")) {
-      if (const auto read = integer<std::uint32_t>(*value, "processors", 0)) calibration_.processors = *read;
-    }
-    if (const Node *value = find(*node, "duration")) {
-      if (const auto read = duration(*value, "duration")) calibration_.duration = *read;
-    }
+    std::vector<std::string_view> keys = {"processors", "duration", "complete"};
+    for (const auto &[key, text] : kProvenanceTexts) keys.emplace_back(key);
+    if (!check_map(*node, "provenance", keys)) return;
+    for (const auto &[key, text] : kProvenanceTexts) take(*node, key, calibration_.*text);
+    take(*node, "processors", calibration_.processors, 0, std::numeric_limits<std::uint32_t>::max());
+    take(*node, "duration", calibration_.duration, 0);
     if (const Node *value = find(*node, "complete")) {
       if (value->text == "true" || value->text == "false") {
         calibration_.complete = value->text == "true";
@@ -103,11 +100,6 @@ class OverheadsReader : private yaml::ValueReader {
   const Node &root_;
   Calibration calibration_;
 };
-
-void write_quoted(Writer &out, std::string_view key, std::string_view value) {
-  out.text(key);
-  out.quoted(value);
-}
 
 void write(Writer &out, std::string_view key, const std::optional<Overheads> &overheads) {
   if (!overheads) return;
@@ -150,15 +142,13 @@ std::string to_yaml(const Calibration &calibration) {
   out.end_map();
   out.text("provenance");
   out.begin_map();
-  write_quoted(out, "date", calibration.date);
-  write_quoted(out, "host", calibration.host);
-  write_quoted(out, "kernel", calibration.kernel);
-  write_quoted(out, "processor", calibration.processor);
+  for (const auto &[key, text] : kProvenanceTexts) {
+    out.text(key);
+    out.quoted(calibration.*text);
+  }
   out.write("processors", calibration.processors);
-  write_quoted(out, "rights", calibration.rights);
   out.write("duration", format_duration(calibration.duration));
   out.write("complete", calibration.complete ? "true" : "false");
-  write_quoted(out, "version", calibration.version);
   out.end_map();
   out.end_map();
   return "# What this machine adds to the jobs of a workload: docs/calibration.md. Charged with --overheads FILE.\n" +
