@@ -11,7 +11,6 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
-#include <nlohmann/json.hpp>
 
 #include "redag/loader/validate.hpp"
 #include "redag/model/clusters.hpp"
@@ -400,35 +399,6 @@ TEST(ShippedWorkloads, ThePaperOnesHaveTheirUtilizationAndShape) {
     }
     EXPECT_NEAR(mean, expected, 0.0005) << file;
   }
-}
-
-// --- the schema says the same as the reader ---
-
-void expect_same_keys(const nlohmann::json &properties, const std::string &unknown_key_hint) {
-  std::size_t known = 1 + static_cast<std::size_t>(std::count(unknown_key_hint.begin(), unknown_key_hint.end(), ','));
-  EXPECT_EQ(properties.size(), known) << unknown_key_hint;
-  for (const auto &[key, value] : properties.items()) {
-    EXPECT_NE((" " + unknown_key_hint + ",").find(" " + key + ","), std::string::npos) << key;
-  }
-}
-
-TEST(Schema, HasTheKeysOfTheReader) {
-  std::ifstream file(testing::repository() / "docs/workload.schema.json");
-  const nlohmann::json schema = nlohmann::json::parse(file);
-  const auto hint_of = [](const std::string &text) {
-    const auto loaded = parse_workload(text, "x");
-    for (const Diagnostic &mistake : loaded.error()) {
-      if (mistake.message.find("'xyzxyzxyz'") != std::string::npos) return mistake.hint;
-    }
-    return std::string();
-  };
-  expect_same_keys(schema["properties"], hint_of("xyzxyzxyz: 1"));
-  expect_same_keys(schema["properties"]["platform"]["properties"], hint_of("platform: {xyzxyzxyz: 1}"));
-  expect_same_keys(schema["definitions"]["cluster"]["properties"], hint_of("platform: {clusters: [{xyzxyzxyz: 1}]}"));
-  expect_same_keys(schema["definitions"]["dag"]["properties"], hint_of("dags: [{xyzxyzxyz: 1}]"));
-  expect_same_keys(schema["definitions"]["task"]["properties"], hint_of("dags: [{tasks: [{xyzxyzxyz: 1}]}]"));
-  expect_same_keys(schema["definitions"]["callback"]["properties"],
-                   hint_of("dags: [{tasks: [{callback: {xyzxyzxyz: 1}}]}]"));
 }
 
 }  // namespace
