@@ -404,8 +404,7 @@ std::vector<Problem> Engine::problems() const {
   if (!of_order.empty()) problems.push_back({of_order, true});
   if (waits > 0) {
     problems.push_back(
-        {fmt::format("jobs waited for a thread {} times, because all {} threads had jobs in progress "
-                     "(raise 'threads')",
+        {fmt::format("jobs waited for a thread {} times, because all {} threads had jobs in progress (raise 'threads')",
                      waits, pool_.size())});
   }
   return problems;

@@ -106,9 +106,7 @@ void write(Writer &out, std::string_view key, const std::optional<Overheads> &ov
   Overheads copy = *overheads;
   out.text(key);
   out.begin_map();
-  for (const std::string_view name : overhead_names()) {
-    out.write(name, format_duration(*overhead_named(copy, name)));
-  }
+  for (const std::string_view name : overhead_names()) out.write(name, format_duration(*overhead_named(copy, name)));
   out.end_map();
 }
 

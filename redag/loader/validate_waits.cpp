@@ -46,8 +46,7 @@ void check_waits(const Workload &workload, const Task &task, bool allowed, Findi
   if (!allowed) {
     findings.error(Field::Segments, {}, fmt::format("task '{}' has segments, which cannot be handled here", task.name),
                    "'redag simulate', 'run' and 'compare' know them, with executors of ReDAG-RT; elsewhere, state "
-                   "'wcet:' in place "
-                   "of 'segments:'");
+                   "'wcet:' in place of 'segments:'");
   }
   if (task.waits.size() > kMaxWaits) {
     findings.error(

@@ -66,11 +66,6 @@ inline constexpr auto kLastReason = Reason::Degraded;
   return kind == JobEventKind::HighMode || kind == JobEventKind::LowMode;
 }
 
-/// True for events of a job that waits without a worker.
-[[nodiscard]] constexpr bool is_of_wait(JobEventKind kind) {
-  return kind == JobEventKind::Waits || kind == JobEventKind::Served || kind == JobEventKind::Woken;
-}
-
 /// An event as the rings hold it: 32 bytes, trivially copyable.
 struct JobEvent {
   Time time = 0;

@@ -163,9 +163,7 @@ void JobTable::prioritise() {
     if (job.state == JobState::Free || job.state == JobState::Waiting) continue;
     const bool has_inherited = job.priority_of != job.task;
     job.rank = tasks[job.task.value].rank;
-    if (is_static(config.policy)) {
-      job.key = has_inherited ? tasks[job.priority_of.value].key : own_key(job);
-    }
+    if (is_static(config.policy)) job.key = has_inherited ? tasks[job.priority_of.value].key : own_key(job);
     // What the job inherited may now be no more urgent than its own key.
     if (has_inherited && own_key(job) <= job.key) {
       job.priority_of = job.task;

@@ -113,9 +113,7 @@ std::vector<Remark> remarks_from(const Json &json) {
   for (const Json &row : rows_of(json, "remarks")) {
     Remark remark;
     remark.begun = integer_of(row, "begun_ns", -kMaxTraceTime, kMaxTraceTime);
-    if (!member(row, "ended_ns").is_null()) {
-      remark.ended = integer_of(row, "ended_ns", -kMaxTraceTime, kMaxTraceTime);
-    }
+    if (!member(row, "ended_ns").is_null()) remark.ended = integer_of(row, "ended_ns", -kMaxTraceTime, kMaxTraceTime);
     remark.text = text_of(row, "text");
     remarks.push_back(std::move(remark));
   }

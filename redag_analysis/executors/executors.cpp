@@ -56,9 +56,7 @@ std::unique_ptr<sched::Scheduler> make_scheduler(std::string_view name, const Wo
   }
   const sched::Config effective = effective_config(*kind, config);
   if (name == "redag") return std::make_unique<sched::PriorityScheduler>(workload, effective);
-  if (name == "events") {
-    return std::make_unique<EventsScheduler>(workload, effective, EventsDispatcher::Kind::Events);
-  }
+  if (name == "events") return std::make_unique<EventsScheduler>(workload, effective, EventsDispatcher::Kind::Events);
   if (name == "cbg") {
     return std::make_unique<EventsScheduler>(workload, effective, EventsDispatcher::Kind::CallbackGroups);
   }

@@ -355,9 +355,7 @@ void Contention::explain_together(SharedTerms &terms) {
     const Duration servers = resources_[r].servers;
     terms.add(is_device ? Term::Kind::Suspended : Term::Kind::Own, unit, on_path, is_device ? 0 : 1);
     (void)sum_works(r, unit.response - unit.jitter);
-    for (std::size_t j = 0; j < k_; ++j) {
-      terms.add_share(Term::Kind::Interference, units_[j], works_[j], servers);
-    }
+    for (std::size_t j = 0; j < k_; ++j) terms.add_share(Term::Kind::Interference, units_[j], works_[j], servers);
     terms.add_blocking(multiply(requests, blocking_[r]), servers);
     terms.add_share(is_device ? Term::Kind::Interference : Term::Kind::Own, unit, own[r].work.volume - on_path,
                     own_divisor(r));

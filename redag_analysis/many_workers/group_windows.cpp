@@ -50,9 +50,7 @@ std::vector<Block> blocks_of(const TaskSet &task_set, const std::vector<GlobalUn
   for (std::size_t k = 0; k < units.size(); ++k) {
     const Unit &unit = task_set.units[units[k].unit];
     const std::uint32_t first = task_set.tasks[task_set.by_rank[unit.first_rank]].level;
-    if (blocks.empty() || (unit.first_rank > last_rank && first > last)) {
-      blocks.push_back(Block{k, k});
-    }
+    if (blocks.empty() || (unit.first_rank > last_rank && first > last)) blocks.push_back(Block{k, k});
     blocks.back().end = k + 1;
     last_rank = std::max(last_rank, unit.last_rank);
     last = std::max(last, last_level(task_set, unit));

@@ -15,9 +15,7 @@ std::uint64_t key_of(const JobEvent &event) { return std::uint64_t{event.task.va
 void BoundWatch::add(std::span<const JobEvent> events, const BoundOf &bound_of, const Exceeded &exceeded) {
   for (const JobEvent &event : events) {
     auto task = tasks_.find(event.task.value);
-    if (task == tasks_.end()) {
-      task = tasks_.emplace(event.task.value, BoundCount{bound_of(event.task), 0, 0}).first;
-    }
+    if (task == tasks_.end()) task = tasks_.emplace(event.task.value, BoundCount{bound_of(event.task), 0, 0}).first;
     BoundCount &count = task->second;
     if (count.bound == 0) continue;
     switch (event.kind) {

@@ -147,9 +147,7 @@ std::vector<std::string> Table::lines(const Layout &layout, bool colour) const {
     }
   };
   add_row([&](std::size_t i) { return Cell{columns_[i].title, Tint::Strong}; });
-  for (const auto &row : rows_) {
-    add_row([&](std::size_t i) { return row[i]; });
-  }
+  for (const auto &row : rows_) add_row([&](std::size_t i) { return row[i]; });
   return text;
 }
 

@@ -128,9 +128,7 @@ metrics::DagSummary GroupReader::pooled(DagId dag) const {
       all.end_to_end.sinks[s].late += one.end_to_end.sinks[s].late;
     }
   }
-  for (metrics::SinkSummary &sink : all.end_to_end.sinks) {
-    sink.response = end_to_end_[sink.task.value].distribution();
-  }
+  for (metrics::SinkSummary &sink : all.end_to_end.sinks) sink.response = end_to_end_[sink.task.value].distribution();
   all.end_to_end.conclude();
   return all;
 }

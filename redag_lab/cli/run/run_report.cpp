@@ -176,9 +176,7 @@ std::string describe(const lab::Session &session, const StreamTraits &terminal, 
   for (const metrics::TaskSummary &task : session.summary.tasks) {
     error = std::max(error, task.jobs.response.percentile_error);
   }
-  if (error > 0) {
-    text += fmt::format("percentiles of tasks with many jobs are accurate to {:.1f} %\n", 100 * error);
-  }
+  if (error > 0) text += fmt::format("percentiles of tasks with many jobs are accurate to {:.1f} %\n", 100 * error);
   if (!session.summary.worker_busy.empty()) {
     text += "workers busy:";
     for (const double share : session.summary.worker_busy) text += fmt::format(" {}", format_percent(share));
