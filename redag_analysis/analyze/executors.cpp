@@ -15,7 +15,7 @@ const std::vector<Method> &executor_methods() {
 }
 
 const std::vector<Method> &methods_of(const executors::ExecutorKind &executor) {
-  static const std::vector<Method> kAnyOrder = {long_paths(), dag_any()};
+  static const std::vector<Method> kAnyOrder = {isolated(), dag_any()};
   static const std::vector<Method> kWaitSet = [] {
     std::vector<Method> all = executor_methods();
     all.insert(all.end(), kAnyOrder.begin(), kAnyOrder.end());

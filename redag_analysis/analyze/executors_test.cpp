@@ -44,7 +44,7 @@ void expect_holds(const Method &method, testing::BoundCaseLimits limits) {
 
 TEST(BoundProperty, OtherExecutorsKeepDagAny) { expect_holds(dag_any(), {.edges = true, .max_dags = 4}); }
 TEST(BoundProperty, OtherExecutorsKeepDagAnyOfTasks) { expect_holds(dag_any(), {}); }
-TEST(BoundProperty, OtherExecutorsKeepLongPaths) { expect_holds(long_paths(), {.edges = true, .max_dags = 1}); }
+TEST(BoundProperty, OtherExecutorsKeepIsolated) { expect_holds(isolated(), {.edges = true, .max_dags = 2}); }
 
 TEST(Executors, OursHasAllMethodsAndPeersHaveTheirs) {
   EXPECT_EQ(&methods_of(executor("redag")), &methods());
@@ -58,7 +58,6 @@ TEST(Executors, OursHasAllMethodsAndPeersHaveTheirs) {
   for (const char *name : {"ste", "mte", "static", "events", "cbg"}) {
     EXPECT_FALSE(has_method(executor(name), "rta_nonpreemptive")) << name;
     EXPECT_FALSE(has_method(executor(name), "sequential_nonpreemptive")) << name;
-    EXPECT_FALSE(has_method(executor(name), "isolated")) << name;
   }
 }
 

@@ -36,7 +36,6 @@ const std::vector<Method> &methods() {
       dag_shapes(),
       dag_bounded(),
       dag_nonpreemptive(),
-      long_paths(),
       isolated(),
       dag_groups(),
       dag_any(),

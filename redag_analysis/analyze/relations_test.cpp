@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <numeric>
+#include <set>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -185,13 +187,13 @@ TEST(Report, KeepsTheMethodsItWasGiven) {
   EXPECT_GT(named, 1000U);
 }
 
+  std::set<std::string_view> names;
 TEST(Registry, NamesAreUniqueAndEveryMethodIsDescribed) {
   for (const Method &method : methods()) {
-    EXPECT_EQ(find_method(method.name), &method) << method.name;
+    EXPECT_TRUE(names.insert(method.name).second) << method.name;
     EXPECT_FALSE(method.cite.empty() || method.assumptions.empty() || method.complexity.empty()) << method.name;
     EXPECT_EQ(method.is_paper(), method.name.starts_with("paper_")) << method.name;
   }
-  EXPECT_EQ(find_method("no_such_method"), nullptr);
 }
 
 }  // namespace

@@ -98,11 +98,4 @@ Bound from_tasks(const TaskSet &task_set, std::vector<ResponseBound> tasks) {
   return bound;
 }
 
-const Method *find_method(std::string_view name) {
-  for (const Method &method : methods()) {
-    if (method.name == name) return &method;
-  }
-  return nullptr;
-}
-
 }  // namespace redag::analysis

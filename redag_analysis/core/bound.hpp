@@ -124,7 +124,5 @@ enum class Verdict : std::uint8_t { Schedulable, NotShown };
 
 /// Every method, in the order in which a report shows them. To add one, add a file pair and a line in methods.cpp.
 [[nodiscard]] const std::vector<Method> &methods();
-/// Finds a method of methods() by name; null for an unknown name.
-[[nodiscard]] const Method *find_method(std::string_view name);
 
 }  // namespace redag::analysis

@@ -49,15 +49,6 @@ Duration graham_response(const Unit &unit, std::uint32_t workers) {
   return unit.length + (unit.volume - unit.length) / workers;
 }
 
-std::optional<std::string> why_not_alone(const TaskSet &task_set) {
-  if (auto reason = why_not_directly(task_set)) return reason;
-  if (task_set.units.size() != 1) return "requires a DAG that has the platform to itself";
-  if (task_set.mode == sched::Preemption::Cooperative)
-    return "in cooperative mode, a suspended job can wait while workers are idle";
-  if (!task_set.groups.empty()) return "with exclusive groups, a worker can be idle while a job waits";
-  return std::nullopt;
-}
-
 // Builds the bound; `response` counts from the release as seen.
 ResponseBound bound_of(const TaskSet &task_set, const GlobalUnit &unit, Duration response) {
   ResponseBound bound;
@@ -72,14 +63,6 @@ ResponseBound bound_of(const TaskSet &task_set, const GlobalUnit &unit, Duration
   terms.add_jitter();
   bound.terms = terms.take();
   return bound;
-}
-
-Outcome apply_long_paths(const TaskSet &task_set) {
-  if (auto reason = why_not_alone(task_set)) return NotApplicable{*reason};
-  const GlobalUnit unit = global::unit_of(task_set, 0);
-  const std::uint32_t workers = unit.bound > 0 ? unit.bound : task_set.platform.workers;
-  const Duration response = long_paths_response(task_set, task_set.units[0], workers);
-  return from_units(task_set, {bound_of(task_set, unit, response)});
 }
 
 // The most jobs of the DAG that can be started and unfinished at once.
@@ -168,52 +151,14 @@ Duration long_paths_response(const TaskSet &task_set, const Unit &unit, std::uin
   return best;
 }
 
-std::optional<std::vector<std::uint32_t>> federated_bounds(const TaskSet &task_set) {
-  std::vector<std::uint32_t> bounds;
-  std::uint64_t sum = 0;
-  for (const CompiledDag &dag : task_set.dags) {
-    auto bound = static_cast<std::uint32_t>(dag.tasks.size());
-    if (dag.units.size() == 1) {
-      const Unit &unit = task_set.units[dag.units.front()];
-      const Duration until = std::min({unit.deadline, unit.limit, unit.period}) - unit.jitter;
-      if (until < unit.length) return std::nullopt;
-      const Duration rest = unit.volume - unit.length;
-      Duration needed = 1;
-      if (rest > 0) {
-        if (until == unit.length) return std::nullopt;
-        needed = ceil_div(rest, until - unit.length);
-      }
-      bound = static_cast<std::uint32_t>(std::min<Duration>(needed, bound));
-    }
-    bounds.push_back(bound);
-    sum += bound;
-  }
-  if (sum > task_set.platform.workers) return std::nullopt;
-  return bounds;
-}
-
-Method long_paths() {
-  return Method{
-      .name = "long_paths",
-      .subject = Subject::Dag,
-      .cite =
-          "Q. He, N. Guan, M. Lv, X. Jiang, W. Chang, Bounding the response time of DAG tasks using long paths, RTSS "
-          "2022",
-      .assumptions =
-          "a single DAG of one rate, any work-conserving order, preemption or not, max_active; R <= T; no shared "
-          "groups, not cooperative",
-      .complexity = "O(workers (tasks + edges))",
-      .apply = apply_long_paths,
-  };
-}
-
 Method isolated() {
   return Method{
       .name = "isolated",
       .subject = Subject::Dag,
       .cite =
           "docs/analysis.md, \"Isolation\"; J. Li, J. Chen, K. Agrawal, C. Lu, C. Gill, A. Saifullah, Analysis of "
-          "federated and global scheduling for parallel real-time tasks, ECRTS 2014; RTSS 2022 (see long_paths)",
+          "federated and global scheduling for parallel real-time tasks, ECRTS 2014; Q. He, N. Guan, M. "
+          "Lv, X. Jiang, W. Chang, Bounding the response time of DAG tasks using long paths, RTSS 2022",
       .assumptions =
           "the max_active of the DAG and of all that can take a worker from it sum up to at most m; any policy and "
           "mode; one rate per DAG with edges, R <= T; no shared groups",

@@ -2,12 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Response times of DAGs that nothing else delays. Such a DAG is alone on the platform, or the max_active of all that
-// could interfere leave it enough workers. Also finds the max_active that make a task set so (federated scheduling).
-// Pure functions.
+// could interfere leave it enough workers. Pure functions.
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <vector>
 
 #include "redag_analysis/core/bound.hpp"
@@ -27,17 +25,8 @@ enum class Heaviest : std::uint8_t { Longest, MostTasks };
 /// M. Lv, X. Jiang, W. Chang, RTSS 2022, theorem 1; j = 0 is the bound of R. Graham, 1969. O(workers (tasks + edges)).
 [[nodiscard]] Duration long_paths_response(const TaskSet &task_set, const Unit &unit, std::uint32_t workers);
 
-/// long_paths_response() of the only DAG.
-[[nodiscard]] Method long_paths();
-
 /// Bounds every DAG from which no other can take a worker, or whose max_active and those of the more urgent DAGs sum up
 /// to at most m. Where jobs are not preempted at once, the sum is over all DAGs. Proof: docs/analysis.md, "Isolation".
 [[nodiscard]] Method isolated();
-
-/// Finds a max_active for each DAG with which isolated() bounds it within its deadline; empty if the workers do not
-/// suffice. A DAG that needs several workers gets n_k = ceil((vol - len) / (D - len)). J. Li, J. Chen, K. Agrawal, C.
-/// Lu, C. Gill, A. Saifullah, ECRTS 2014 (D = T); S. Baruah, DATE 2015 (D <= T). DAGs of several parts get as many as
-/// they have tasks.
-[[nodiscard]] std::optional<std::vector<std::uint32_t>> federated_bounds(const TaskSet &task_set);
 
 }  // namespace redag::analysis

@@ -33,9 +33,9 @@ BoundCaseLimits graphs(sched::Preemption preemption) {
   return limits;
 }
 
-TEST(BoundProperty, LongPaths) {
-  expect_bound_holds(long_paths(), cases(graphs(sched::Preemption::Full)), {.workloads = 1000});
-  expect_bound_holds(long_paths(), cases(graphs(sched::Preemption::None)), {.workloads = 1000});
+TEST(BoundProperty, IsolatedAlone) {
+  expect_bound_holds(isolated(), cases(graphs(sched::Preemption::Full)), {.workloads = 1000});
+  expect_bound_holds(isolated(), cases(graphs(sched::Preemption::None)), {.workloads = 1000});
 }
 
 // Small DAGs with bounds of one or two. For what the generator otherwise draws, few workers would hardly ever suffice.
@@ -79,9 +79,9 @@ std::optional<Duration> dag_response(const Method &method, const TaskSet &task_s
 TEST(DagIsolated, LongPathsCountWhatRunsBesideThem) {
   // len 15, vol 32; paths of 15, 9 and 8. On three workers nothing waits; on two, j = 1 leaves 8 for one worker.
   const TaskSet three = compiled(3, {fork_join("d")}, sched::Preemption::Full);
-  EXPECT_EQ(dag_response(long_paths(), three, 0), 15);
+  EXPECT_EQ(dag_response(isolated(), three, 0), 15);
   const TaskSet two = compiled(2, {fork_join("d")}, sched::Preemption::Full);
-  EXPECT_EQ(dag_response(long_paths(), two, 0), 15 + std::min(17 / 2, 8));
+  EXPECT_EQ(dag_response(isolated(), two, 0), 15 + std::min(17 / 2, 8));
 }
 
 TEST(DagIsolated, BoundsThatSumUpToTheWorkersShareNothing) {
@@ -108,22 +108,6 @@ TEST(DagIsolated, TheMostUrgentHasAllWorkersWhereItPreempts) {
   const TaskSet task_set = compiled(2, {fork_join("first"), fork_join("second", 110)}, sched::Preemption::Full);
   EXPECT_EQ(dag_response(isolated(), task_set, 0), 15 + 8);
   EXPECT_FALSE(dag_response(isolated(), task_set, 1));
-}
-
-TEST(DagIsolated, FederatedBoundsMeetTheDeadlines) {
-  Dag heavy = fork_join("heavy");
-  heavy.deadline = 24;  // (32 - 15) / (24 - 15): two workers
-  const Dag light = fork_join("light");
-  const auto bounds = federated_bounds(compiled(3, {heavy, light}, sched::Preemption::None));
-  ASSERT_TRUE(bounds);
-  EXPECT_EQ(*bounds, (std::vector<std::uint32_t>{2, 1}));
-  EXPECT_FALSE(federated_bounds(compiled(2, {heavy, light}, sched::Preemption::None)));
-
-  std::vector<Dag> dags{heavy, light};
-  for (std::size_t d = 0; d < dags.size(); ++d) dags[d].max_active = (*bounds)[d];
-  const TaskSet task_set = compiled(3, dags, sched::Preemption::None);
-  EXPECT_LE(dag_response(isolated(), task_set, 0).value(), 24);
-  EXPECT_EQ(verdict(task_set, std::get<Bound>(isolated().apply(task_set))), Verdict::Schedulable);
 }
 
 }  // namespace
