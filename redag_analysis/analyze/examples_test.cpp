@@ -169,11 +169,11 @@ TEST(Examples, DagsOnOneWorker) {
   ASSERT_EQ(full.units.size(), 2U);
   EXPECT_EQ(full.units[1].volume, 18 * kMillisecond);
   EXPECT_EQ(full.units[1].length, 14 * kMillisecond);
-  Bound bound = std::get<Bound>(dag_one_worker_preemptive().apply(full));
+  Bound bound = std::get<Bound>(rta_preemptive().apply(full));
   EXPECT_EQ(bound.dags[0].response, 3 * kMillisecond);
   EXPECT_EQ(bound.dags[1].response, (18 + 2 * 3) * kMillisecond);
 
-  bound = std::get<Bound>(dag_one_worker_deferred().apply(compiled(workload, kNone)));
+  bound = std::get<Bound>(rta_nonpreemptive().apply(compiled(workload, kNone)));
   EXPECT_EQ(bound.dags[0].response, (3 + 9) * kMillisecond - 1) << "blocked by the longest callback";
   EXPECT_EQ(bound.dags[1].response, (18 + 3) * kMillisecond) << "the last callback, of 4, starts at 17";
 }

@@ -54,13 +54,13 @@ TEST(Losses, OneWorker) { testing::expect_bound_holds(rta_preemptive(), with_los
 TEST(Losses, OneWorkerDags) {
   BoundCaseLimits limits = limits_for(1);
   limits.edges = true;
-  testing::expect_bound_holds(dag_one_worker_preemptive(), with_losses(limits));
+  testing::expect_bound_holds(rta_preemptive(), with_losses(limits));
 }
 
 TEST(Losses, OneWorkerRateEdges) {
   BoundCaseLimits limits = limits_for(1);
   limits.edges = limits.rates = true;
-  testing::expect_bound_holds(dag_one_worker_preemptive(), with_losses(limits));
+  testing::expect_bound_holds(rta_preemptive(), with_losses(limits));
 }
 
 TEST(Losses, SeveralWorkers) { testing::expect_bound_holds(dag_bounded(), with_losses(limits_for(2))); }

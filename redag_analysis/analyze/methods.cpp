@@ -24,8 +24,6 @@ const std::vector<Method> &methods() {
       rta_preemptive(),
       rta_nonpreemptive(),
       rta_deferred(),
-      dag_one_worker_preemptive(),
-      dag_one_worker_deferred(),
       amc_rtb(),
       // One worker, edf
       edf_demand(),

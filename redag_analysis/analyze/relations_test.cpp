@@ -69,8 +69,7 @@ TEST(Relations, MoreExecutionNeverShrinksABound) {
       if (task.region > 0 && limits.preemption == sched::Preemption::Cooperative) return;  // a last region can shrink
       const auto after = compile(longer.workload, longer.platform);
       if (!after) return;
-      for (const Method &method : {rta_preemptive(), rta_nonpreemptive(), rta_deferred(), dag_one_worker_preemptive(),
-                                   dag_one_worker_deferred()}) {
+      for (const Method &method : {rta_preemptive(), rta_nonpreemptive(), rta_deferred()}) {
         const Outcome first = method.apply(task_set);
         const Outcome second = method.apply(*after);
         if (bound_of(first) == nullptr || bound_of(second) == nullptr) continue;
@@ -173,7 +172,7 @@ TEST(Report, TrustsNoUnsoundEquationAndNamesWhoSpoke) {
 TEST(Report, KeepsTheMethodsItWasGiven) {
   std::size_t named = 0;
   for_cases(cases(BoundCaseLimits{}), kCases, [&](const BoundCase &, const TaskSet &task_set, Rng &) {
-    std::optional<Report> report = analyze(task_set, {dag_one_worker_preemptive(), rta_preemptive()});
+    std::optional<Report> report = analyze(task_set, {rta_nonpreemptive(), rta_preemptive()});
     const Report copy = *report;
     report.reset();
     ASSERT_EQ(copy.methods.size(), 2U);
@@ -187,8 +186,8 @@ TEST(Report, KeepsTheMethodsItWasGiven) {
   EXPECT_GT(named, 1000U);
 }
 
-  std::set<std::string_view> names;
 TEST(Registry, NamesAreUniqueAndEveryMethodIsDescribed) {
+  std::set<std::string_view> names;
   for (const Method &method : methods()) {
     EXPECT_TRUE(names.insert(method.name).second) << method.name;
     EXPECT_FALSE(method.cite.empty() || method.assumptions.empty() || method.complexity.empty()) << method.name;

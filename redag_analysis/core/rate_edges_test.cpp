@@ -67,28 +67,27 @@ BoundCaseLimits with_max_active(BoundCaseLimits limits) {
 const testing::BoundPropertyOptions kFew{.workloads = 300, .runs = 6};
 
 TEST(BoundProperty, RatesOneWorkerPreemptive) {
-  expect_bound_holds(dag_one_worker_preemptive(), cases(rates(sched::Preemption::Full, 1)), kFew);
+  expect_bound_holds(rta_preemptive(), cases(rates(sched::Preemption::Full, 1)), kFew);
 }
 
 TEST(BoundProperty, RatesOneWorkerPreemptiveWithEverything) {
-  expect_bound_holds(dag_one_worker_preemptive(), cases(with_queues_and_groups(rates(sched::Preemption::Full, 1))),
-                     kFew);
+  expect_bound_holds(rta_preemptive(), cases(with_queues_and_groups(rates(sched::Preemption::Full, 1))), kFew);
 }
 
 TEST(BoundProperty, RatesOneWorkerPreemptiveMaxActive) {
-  expect_bound_holds(dag_one_worker_preemptive(), cases(with_max_active(rates(sched::Preemption::Full, 1))), kFew);
+  expect_bound_holds(rta_preemptive(), cases(with_max_active(rates(sched::Preemption::Full, 1))), kFew);
 }
 
 TEST(BoundProperty, RatesOneWorkerNonpreemptive) {
   BoundCaseLimits limits = with_queues_and_groups(rates(sched::Preemption::None, 1));
   limits.levels = false;
-  expect_bound_holds(dag_one_worker_deferred(), cases(limits), kFew);
+  expect_bound_holds(rta_nonpreemptive(), cases(limits), kFew);
 }
 
 TEST(BoundProperty, RatesOneWorkerCooperative) {
   BoundCaseLimits limits = rates(sched::Preemption::Cooperative, 1);
   limits.queues = limits.levels = true;
-  expect_bound_holds(dag_one_worker_deferred(), cases(limits), kFew);
+  expect_bound_holds(rta_deferred(), cases(limits), kFew);
 }
 
 TEST(BoundProperty, RatesOfSingleTasksOneWorker) {
@@ -133,7 +132,7 @@ TEST(BoundProperty, RatesOfTasksThatWait) {
   expect_bound_holds(suspension_aware(), with_waits(limits), kFew);
   limits = rates(sched::Preemption::Full, 1);
   limits.max_utilization = 0.5;
-  expect_bound_holds(dag_one_worker_preemptive(), with_waits(limits), kFew);
+  expect_bound_holds(rta_preemptive(), with_waits(limits), kFew);
 }
 
 TEST(BoundProperty, RatesDagGroups) {
@@ -353,8 +352,7 @@ TEST(RateEdges, ExecutorsHaveNoCommonClock) {
 TEST(RateEdges, OtherMethodsRefuseThem) {
   const Workload workload =
       make_workload({make_dag("d", {{.name = "a", .period = 5}, {.name = "b", .period = 10, .after = {0}}})}, 1);
-  constexpr std::string_view kKnow[] = {"rta_preemptive", "dag_one_worker_preemptive", "dag_bounded", "guan",
-                                        "dag_shapes"};
+  constexpr std::string_view kKnow[] = {"rta_preemptive", "dag_bounded", "guan", "dag_shapes"};
   for (const std::uint32_t workers : {1U, 2U}) {
     for (const MethodReport &report : analyze(compiled(workload, workers)).methods) {
       if (std::find(std::begin(kKnow), std::end(kKnow), report.method->name) != std::end(kKnow)) continue;

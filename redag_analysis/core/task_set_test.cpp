@@ -165,15 +165,13 @@ TEST(TaskSet, BadInputIsAnError) {
 
 TEST(NotApplicable, OneWorkerBounds) {
   const AnalysisPlatform full = mode(sched::Preemption::Full);
-  EXPECT_THAT(refusal(dag_one_worker_preemptive(), two_dags(), mode(sched::Preemption::Full, 2)),
-              HasSubstr("one worker"));
-  EXPECT_THAT(refusal(rta_preemptive(), two_dags(), full), HasSubstr("predecessors"));
-  EXPECT_THAT(refusal(dag_one_worker_deferred(), two_dags(), full), HasSubstr("preempted"));
-  EXPECT_THAT(refusal(dag_one_worker_preemptive(), two_dags(), mode(sched::Preemption::None)), HasSubstr("full"));
-  EXPECT_EQ(refusal(dag_one_worker_preemptive(), two_dags(), full), "");
+  EXPECT_THAT(refusal(rta_preemptive(), two_dags(), mode(sched::Preemption::Full, 2)), HasSubstr("one worker"));
+  EXPECT_THAT(refusal(rta_nonpreemptive(), two_dags(), full), HasSubstr("preempted"));
+  EXPECT_THAT(refusal(rta_preemptive(), two_dags(), mode(sched::Preemption::None)), HasSubstr("full"));
+  EXPECT_EQ(refusal(rta_preemptive(), two_dags(), full), "");
   Workload edf = two_dags();
   edf.policy = PolicyKind::Edf;
-  EXPECT_THAT(refusal(dag_one_worker_preemptive(), edf, full), HasSubstr("static"));
+  EXPECT_THAT(refusal(rta_preemptive(), edf, full), HasSubstr("static"));
   EXPECT_THAT(refusal(edf_demand(), edf, full), HasSubstr("predecessors"));
 }
 

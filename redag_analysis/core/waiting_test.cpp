@@ -41,8 +41,7 @@ TEST(BoundProperty, RtaPreemptiveWithWaits) {
 }
 
 TEST(BoundProperty, DagOneWorkerPreemptiveWithWaits) {
-  expect_bound_holds(dag_one_worker_preemptive(), with_waits({.edges = true, .jitter = true, .caps = true}),
-                     {.workloads = 2000});
+  expect_bound_holds(rta_preemptive(), with_waits({.edges = true, .jitter = true, .caps = true}), {.workloads = 2000});
 }
 
 // Periods 100, 200, 300; hi and lo ask the device, which mid does not need.

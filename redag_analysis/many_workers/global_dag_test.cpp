@@ -247,7 +247,7 @@ TEST(GlobalDag, OnOneWorkerItIsNotBelowTheExactResponse) {
   limits.jitter = limits.overheads = false;
   std::uint64_t equal = 0;
   const auto compared = compare_all(limits, 1000, [&](const testing::BoundCase &bound_case, const TaskSet &task_set) {
-    const Outcome exact = dag_one_worker_preemptive().apply(task_set);
+    const Outcome exact = rta_preemptive().apply(task_set);
     const Outcome outcome = dag_bounded().apply(task_set);
     if (!std::holds_alternative<Bound>(exact) || !std::holds_alternative<Bound>(outcome)) return false;
     for (std::size_t d = 0; d < task_set.dags.size(); ++d) {

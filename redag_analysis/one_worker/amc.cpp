@@ -172,7 +172,7 @@ Method amc_rtb() {
       .assumptions =
           "one worker, full preemption, static priorities, some wcet_low below its wcet, no groups, R <= T; any "
           "degrade; "
-          "DAGs of one rate as in dag_one_worker_preemptive, without jitter if of lower criticality; shared levels; of "
+          "DAGs of one rate as in rta_preemptive, without jitter if of lower criticality; shared levels; of "
           "several executors, HI mode of one is none of the others",
       .complexity = "pseudo-polynomial; O(n) per step",
       .knows_modes = true,

@@ -10,45 +10,22 @@
 namespace redag::analysis {
 namespace {
 
-std::optional<std::string> why_not(const TaskSet &task_set, sched::Preemption mode, bool edges) {
-  if (auto reason = one_worker::why_not(task_set)) return reason;
-  if (edges && !task_set.has_edges()) return "no task has predecessors: see the bounds for independent tasks";
-  if (!edges && task_set.has_edges()) return "tasks have predecessors: see the bounds for DAGs";
-  if (task_set.mode == mode) return std::nullopt;
+Outcome apply_in(sched::Preemption mode, const TaskSet &task_set) {
+  if (auto reason = one_worker::why_not(task_set)) return NotApplicable{*reason};
+  if (task_set.mode == mode) return one_worker::bound_tasks(task_set, mode != sched::Preemption::Full);
   switch (mode) {
-    case sched::Preemption::None: return "requires jobs that run to completion, but jobs can be preempted here";
-    case sched::Preemption::Cooperative: return "requires cooperative jobs with preemption points";
+    case sched::Preemption::None:
+      return NotApplicable{"requires jobs that run to completion, but jobs can be preempted here"};
+    case sched::Preemption::Cooperative: return NotApplicable{"requires cooperative jobs with preemption points"};
     case sched::Preemption::Full: break;
   }
-  return "requires full preemption, but jobs keep the worker here until they end or reach a preemption point";
+  return NotApplicable{
+      "requires full preemption, but jobs keep the worker here until they end or reach a preemption point"};
 }
 
-Outcome independent_full(const TaskSet &task_set) {
-  if (auto reason = why_not(task_set, sched::Preemption::Full, false)) return NotApplicable{*reason};
-  return one_worker::bound_tasks(task_set, false);
-}
-
-Outcome independent_none(const TaskSet &task_set) {
-  if (auto reason = why_not(task_set, sched::Preemption::None, false)) return NotApplicable{*reason};
-  return one_worker::bound_tasks(task_set, true);
-}
-
-Outcome independent_cooperative(const TaskSet &task_set) {
-  if (auto reason = why_not(task_set, sched::Preemption::Cooperative, false)) return NotApplicable{*reason};
-  return one_worker::bound_tasks(task_set, true);
-}
-
-Outcome dags_full(const TaskSet &task_set) {
-  if (auto reason = why_not(task_set, sched::Preemption::Full, true)) return NotApplicable{*reason};
-  return one_worker::bound_tasks(task_set, false);
-}
-
-Outcome dags_deferred(const TaskSet &task_set) {
-  const auto mode =
-      task_set.mode == sched::Preemption::Full ? sched::Preemption::None : task_set.mode;  // both None and Cooperative
-                                                                                           // are accepted
-  if (auto reason = why_not(task_set, mode, true)) return NotApplicable{*reason};
-  return one_worker::bound_tasks(task_set, true);
+template <sched::Preemption kMode>
+Outcome apply(const TaskSet &task_set) {
+  return across_rates(task_set, [](const TaskSet &alone) { return apply_in(kMode, alone); });
 }
 
 }  // namespace
@@ -60,14 +37,14 @@ Method rta_preemptive() {
       .cite =
           "M. Joseph, P. Pandya, Finding response times in a real-time system, The Computer Journal 29(5), 1986; K. "
           "Tindell, A. Burns, A. Wellings, An extendible approach for analysing fixed priority hard real-time tasks, "
-          "Real-Time Systems 6(2), 1994",
+          "Real-Time Systems 6(2), 1994; DAGs: docs/analysis.md, \"One worker\"",
       .assumptions =
-          "one worker, full preemption, static priorities, edges only between rates; any deadlines, release jitter, "
-          "shared "
-          "groups with priority inheritance, shared levels",
+          "one worker, full preemption, static priorities; any deadlines, but R <= T for DAGs; timers that keep their "
+          "periods where edges join rates; release jitter, shared groups with priority inheritance, shared levels, "
+          "max_active",
       .complexity = "pseudo-polynomial; O(n) per step",
       .knows_waits = true,
-      .apply = [](const TaskSet &task_set) { return across_rates(task_set, independent_full); },
+      .apply = apply<sched::Preemption::Full>,
   };
 }
 
@@ -77,13 +54,12 @@ Method rta_nonpreemptive() {
       .subject = Subject::Task,
       .cite =
           "R. Davis, A. Burns, R. Bril, J. Lukkien, Controller Area Network (CAN) schedulability analysis: Refuted, "
-          "revisited and revised, Real-Time Systems 35(3), 2007",
+          "revisited and revised, Real-Time Systems 35(3), 2007; DAGs: docs/analysis.md, \"One worker\"",
       .assumptions =
-          "one worker, jobs run to completion, static priorities, edges only between rates; any deadlines, release "
-          "jitter, "
-          "groups",
+          "one worker, jobs run to completion, static priorities; any deadlines, but R <= T for DAGs; timers that keep "
+          "their periods where edges join rates; release jitter, groups, max_active",
       .complexity = "pseudo-polynomial; O(n) per step, all jobs of the busy period",
-      .apply = [](const TaskSet &task_set) { return across_rates(task_set, independent_none); },
+      .apply = apply<sched::Preemption::None>,
   };
 }
 
@@ -93,41 +69,10 @@ Method rta_deferred() {
       .subject = Subject::Task,
       .cite =
           "R. Bril, J. Lukkien, W. Verhaegh, Worst-case response time analysis of real-time tasks under fixed-priority "
-          "scheduling with deferred preemption, Real-Time Systems 42, 2009",
-      .assumptions =
-          "one worker, cooperative preemption points every `region`, static priorities, edges only between rates, no "
-          "shared groups; any "
-          "deadlines, release jitter, shared levels",
+          "scheduling with deferred preemption, Real-Time Systems 42, 2009; DAGs: docs/analysis.md, \"One worker\"",
+      .assumptions = "as rta_nonpreemptive, with preemption points every `region`; shared levels; no shared groups",
       .complexity = "pseudo-polynomial; O(n) per step, all jobs of the busy period",
-      .apply = [](const TaskSet &task_set) { return across_rates(task_set, independent_cooperative); },
-  };
-}
-
-Method dag_one_worker_preemptive() {
-  return Method{
-      .name = "dag_one_worker_preemptive",
-      .subject = Subject::Dag,
-      .cite = "as rta_preemptive, with C = volume of the DAG (docs/analysis.md, \"One worker\")",
-      .assumptions =
-          "one worker, full preemption, static priorities; R <= T for DAGs; timers that keep their periods where edges "
-          "join rates; jitter, groups with inheritance, shared levels, max_active",
-      .complexity = "pseudo-polynomial; O(n) per step",
-      .knows_waits = true,
-      .apply = [](const TaskSet &task_set) { return across_rates(task_set, dags_full); },
-  };
-}
-
-Method dag_one_worker_deferred() {
-  return Method{
-      .name = "dag_one_worker_deferred",
-      .subject = Subject::Dag,
-      .cite = "as rta_deferred, with C = volume of the DAG (docs/analysis.md, \"One worker\")",
-      .assumptions =
-          "one worker, jobs run to completion or to a preemption point, static priorities; R <= T for DAGs; timers "
-          "that "
-          "keep their periods where edges join rates; jitter, max_active; groups unless cooperative",
-      .complexity = "pseudo-polynomial; O(n) per step, all jobs of the busy period",
-      .apply = [](const TaskSet &task_set) { return across_rates(task_set, dags_deferred); },
+      .apply = apply<sched::Preemption::Cooperative>,
   };
 }
 

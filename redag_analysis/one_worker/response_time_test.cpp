@@ -47,14 +47,14 @@ TEST(BoundProperty, DagOneWorkerPreemptive) {
   BoundCaseLimits limits = everything(sched::Preemption::Full);
   limits.edges = true;
   limits.max_dags = 4;
-  expect_bound_holds(dag_one_worker_preemptive(), cases(limits), kFew);
+  expect_bound_holds(rta_preemptive(), cases(limits), kFew);
 }
 
 TEST(BoundProperty, DagOneWorkerNonpreemptive) {
   BoundCaseLimits limits = everything(sched::Preemption::None);
   limits.edges = true;
   limits.max_dags = 4;
-  expect_bound_holds(dag_one_worker_deferred(), cases(limits), kFew);
+  expect_bound_holds(rta_nonpreemptive(), cases(limits), kFew);
 }
 
 TEST(BoundProperty, DagOneWorkerCooperative) {
@@ -62,7 +62,7 @@ TEST(BoundProperty, DagOneWorkerCooperative) {
   limits.edges = true;
   limits.groups = false;
   limits.max_dags = 4;
-  expect_bound_holds(dag_one_worker_deferred(), cases(limits), kFew);
+  expect_bound_holds(rta_deferred(), cases(limits), kFew);
 }
 
 // Any of several equals can go first: the one that was released an instant before.

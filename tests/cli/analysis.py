@@ -95,7 +95,7 @@ class Analyze(Case):
         result = self.expect(redag("analyze", self.cart, "--all"), 0)
         # One worker, run to completion: plan (25 ms) blocks fast, whose period is 10 ms.
         self.assertRegex(result.stdout, r"fast\.sense +10ms +29ms +- +may lose jobs +by_demand")
-        self.assertRegex(result.stdout, r"slow\.plan +100ms +\S+ms +\S+ms +ok +dag_one_worker_deferred")
+        self.assertRegex(result.stdout, r"slow\.plan +100ms +\S+ms +\S+ms +ok +rta_nonpreemptive")
         self.assertIn("preemption: none\n", result.stdout)
         self.assertIn("not shown schedulable: 2 tasks whose jobs can be lost", result.stdout)
         self.assertRegex(result.stdout, r"methods that do not apply:\n(.*\n)*  \S.*\n    .*\bdag_bounded\b")
@@ -148,8 +148,8 @@ dags:
 
     def test_methods_of_choice(self):
         once = json.loads(self.expect(redag("analyze", self.cart, "--json", "--methods", "--method", "isolated", "--method",
-                                            "dag_one_worker_deferred"), 0).stdout)
-        self.assertEqual([method["name"] for method in once["methods"]], ["dag_one_worker_deferred", "isolated"])
+                                            "rta_nonpreemptive"), 0).stdout)
+        self.assertEqual([method["name"] for method in once["methods"]], ["rta_nonpreemptive", "isolated"])
         every = json.loads(redag("analyze", self.cart, "--json", "--methods", "--preemption", "os").stdout)
         tightest = {}
         for method in every["methods"]:

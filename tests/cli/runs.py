@@ -266,7 +266,7 @@ class Waits(Case):
             self.assertIn(line, explained.stdout)
         # Waits of more urgent tasks are no execution of theirs, so the second bound is the smaller one.
         self.assertIn("suspension_aware", explained.stdout)
-        oblivious = ["--method", "rta_preemptive", "--method", "dag_one_worker_preemptive"]
+        oblivious = ["--method", "rta_preemptive"]
         self.expect(redag("analyze", one, "--check", *oblivious), 0)
         # A device that serves in the order of requests lets each less urgent task go first.
         fifo = self.write("fifo.yaml", one.read_text().replace("queue: priority", "queue: fifo"))
