@@ -26,8 +26,6 @@ struct GlobalUnit {
   Duration response = 0;  // of the current bound, once known
   Duration work = 0;      // in the current window, of which `carried` is an earlier job's; scratch of the fixed points
   Duration carried = 0;
-  Duration next_job = 0;    // the window in which its next job begins; scratch of the fixed points, as is begun_work
-  Duration begun_work = 0;  // of the jobs before it, each executed in full
   Duration length = 0;
   Duration limit = 0;            // a response above it counts as none; never above the period
   Duration turn = 0;             // width * period, see divide()

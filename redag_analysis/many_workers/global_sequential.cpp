@@ -15,148 +15,67 @@ namespace redag::analysis {
 namespace global {
 namespace {
 
-// How long ago the last job was released at the end of a window of length x, which starts when an instant with an idle
-// worker ends. Most windows of one search begin no other job than the window before, and need no division.
-inline Duration since_last_job(GlobalUnit &task, Duration x) {
-  const Duration since = x + task.period - task.next_job;
-  if (static_cast<std::uint64_t>(since) < static_cast<std::uint64_t>(task.period)) return since;
+// A task in a window of length x that starts when an instant with an idle worker ends.
+struct InWindow {
+  Duration since = 0;  // how long ago its last job was released
+  Duration begun = 0;  // the work of all its jobs if each executes in full
+  Duration fresh = 0;  // its work in the window if no earlier job executes in it
+};
+
+InWindow in_window(const GlobalUnit &task, Duration x) {
   const Division jobs = divide(x + task.jitter, task);
-  task.next_job = (jobs.quotient + 1) * task.period - task.jitter;
-  task.begun_work = (jobs.quotient + 1) * task.volume;
-  return jobs.remainder;
-}
-
-// No window is known yet.
-void forget_jobs(GlobalUnit &task) { task.next_job = 0; }
-
-// The work of a task in the window that since_last_job() saw last, if no earlier job executes in the window.
-inline Duration fresh_work(const GlobalUnit &task, Duration since) {
-  return task.begun_work - std::max<Duration>(0, task.volume - since);
+  const Duration begun = (jobs.quotient + 1) * task.volume;
+  return {jobs.remainder, begun, begun - std::max<Duration>(0, task.volume - jobs.remainder)};
 }
 
 // How much more it executes with an earlier job, at most C. The earlier job has executed for at least a tick, unless
-// jitter can hide its release. The jobs that follow it are released J + C later than those of fresh_work(). Requires
+// jitter can hide its release. The jobs that follow it are released J + C later than the fresh ones. Requires
 // J + C <= R <= T.
-inline Duration carried_work(const GlobalUnit &task, Duration since, Duration fresh) {
+Duration carried_work(const GlobalUnit &task, const InWindow &in) {
   const Duration wcet = task.volume;
   const Duration most = task.jitter > 0 ? wcet : wcet - 1;
-  const Duration into = since - (task.jitter + wcet);
+  const Duration into = in.since - (task.jitter + wcet);
   const Duration tail = into + task.response;
   if (into >= 0) return std::clamp<Duration>(tail - task.period, 0, most);
-  return std::max({fresh, task.begun_work - wcet + std::min(tail, most), wcet}) - fresh;
+  return std::max({in.fresh, in.begun - wcet + std::min(tail, most), wcet}) - in.fresh;
 }
 
-// For how long the work with an earlier job grows as fast as the window. (Where C alone counts, the window is shorter
-// than C, and WorkSum cuts the work.)
-inline Duration carried_rise(const GlobalUnit &task, Duration since) {
-  const Duration wcet = task.volume;
-  const Duration into = since - (task.jitter + wcet);
-  const Duration tail = into + task.response - (into < 0 ? 0 : task.period);
-  return tail < 0 ? 0 : (task.jitter > 0 ? wcet : wcet - 1) - tail;
-}
-
-// The sum of the works min(W_i, d) in one window, and how it goes on: some W_i are at least d and grow with it until d
-// exceeds them, and some others grow as fast as the window for a while.
-class WorkSum {
- public:
-  explicit WorkSum(Duration d) : d_(d) {}
-
-  // `rise` is how long the work grows as fast as the window; not positive: it does not.
-  void add(Duration work, Duration rise) {
-    if (work >= d_) {
-      ++cut_;
-      least_cut_ = std::min(least_cut_, work);
-      return;
-    }
-    uncut_ += work;
-    rising_ += rise > 0 ? 1 : 0;
-    shortest_rise_ = rise > 0 ? std::min(shortest_rise_, rise) : shortest_rise_;
+// least_window() of all works.
+Duration window_after(std::span<const GlobalUnit> others, Duration d, Duration rest, std::uint32_t workers) {
+  Largest largest(workers - 1);
+  Duration sum = rest;
+  for (const GlobalUnit &other : others) {
+    sum += other.work;
+    if (other.work >= d) largest.offer(other.work);
   }
-  // Replaces a work below d by a larger one. The shortest rise may remain that of the work that is gone.
-  void replace(Duration work, Duration rise, Duration larger, Duration its_rise) {
-    uncut_ -= work;
-    rising_ -= rise > 0 ? 1 : 0;
-    add(larger, its_rise);
-  }
-
-  // Returns d or less if `d` workers' time exceeds the sum, and otherwise a later window, before which it does not.
-  // That is least_window() of the units' `work`, or later where works rise. Where half of the free workers execute
-  // works that rise, least_window() would only halve the distance, and so take a step for each bit of a time.
-  [[nodiscard]] Duration next(std::span<const GlobalUnit> units, std::uint32_t workers) const {
-    const Duration share = static_cast<Duration>(workers) - cut_;
-    if (share > 0 && uncut_ < share * d_) return d_;
-    const Duration end = std::min(d_ + shortest_rise_, least_cut_) + 1;  // works go on as they are before it
-    const Duration found = share > rising_ ? (uncut_ - rising_ * d_) / (share - rising_) + 1 : end;
-    if (found <= end) return found;
-    Largest largest(workers - 1);
-    Duration sum = uncut_;
-    for (const GlobalUnit &other : units) {
-      if (other.work < d_) continue;  // the result is at least d: smaller work is not cut
-      sum += other.work;
-      largest.offer(other.work);
-    }
-    return std::max(end, least_window(sum, largest.entries(), workers));
-  }
-
- private:
-  Duration d_;
-  Duration uncut_ = 0;
-  Duration cut_ = 0;
-  Duration least_cut_ = kMaxDuration / 2;
-  Duration rising_ = 0;
-  Duration shortest_rise_ = kMaxDuration / 2;
-};
-
-// The next window after `d` if all tasks carry work in.
-Duration all_carry_window(std::span<GlobalUnit> more_urgent, Duration x, Duration d, std::uint32_t workers) {
-  WorkSum sum(d);
-  for (GlobalUnit &other : more_urgent) {
-    const Duration since = since_last_job(other, x);
-    other.work = fresh_work(other, since);
-    other.work += carried_work(other, since, other.work);
-    sum.add(other.work, carried_rise(other, since));
-  }
-  return sum.next(more_urgent, workers);
+  return least_window(sum, largest.entries(), workers);
 }
 
 // The next window after `d` if those m - 1 tasks carry work in that have the largest one at `d`.
 Duration guan_window(std::span<GlobalUnit> more_urgent, Duration x, Duration d, std::uint32_t workers) {
   Effort::spend(more_urgent.size() + 1);
   const std::size_t carrying = workers - 1;
-  if (carrying >= more_urgent.size() || carrying > Largest::kMost) return all_carry_window(more_urgent, x, d, workers);
-  Largest most_carried(carrying);
-  WorkSum sum(d);
+  const bool all_carry = carrying >= more_urgent.size() || carrying > Largest::kMost;
+  Largest most_carried(all_carry ? 0 : carrying);
   for (std::size_t i = 0; i < more_urgent.size(); ++i) {
     GlobalUnit &other = more_urgent[i];
-    const Duration since = since_last_job(other, x);
-    other.work = fresh_work(other, since);
-    sum.add(other.work, other.volume - since);
-    if (other.work >= d || !most_carried.accepts(other.volume)) continue;
-    other.carried = carried_work(other, since, other.work);
-    most_carried.offer(std::min(other.carried, d - other.work), i);
+    const InWindow in = in_window(other, x);
+    other.work = in.fresh;
+    other.carried = carried_work(other, in);
+    if (all_carry) other.work += other.carried;
+    if (other.work < d) most_carried.offer(std::min(other.carried, d - other.work), i);
   }
   for (const Largest::Entry &entry : most_carried.entries()) {
-    if (entry.value == 0) break;
-    GlobalUnit &other = more_urgent[entry.whose];
-    const Duration since = since_last_job(other, x);
-    const Duration fresh = other.work;
-    other.work += other.carried;
-    sum.replace(fresh, other.volume - since, other.work, carried_rise(other, since));
+    if (entry.value > 0) more_urgent[entry.whose].work += more_urgent[entry.whose].carried;
   }
-  return sum.next(more_urgent, workers);
+  return window_after(more_urgent, d, 0, workers);
 }
 
 // least_window() with `rest` and the sequential_work() of all units in windows of length d.
 Duration carrying_window(std::span<GlobalUnit> others, Duration d, Duration rest, std::uint32_t workers) {
   Effort::spend(others.size() + 1);
-  Largest largest(workers - 1);
-  Duration sum = rest;
-  for (GlobalUnit &other : others) {
-    other.work = sequential_work(other, d);
-    sum += other.work;
-    if (other.work >= d) largest.offer(other.work);
-  }
-  return least_window(sum, largest.entries(), workers);
+  for (GlobalUnit &other : others) other.work = sequential_work(other, d);
+  return window_after(others, d, rest, workers);
 }
 
 // The length from which to search: each other executes for at least min(C, d) in a window of d or more.
@@ -182,7 +101,6 @@ bool guan_response(std::span<GlobalUnit> units, std::size_t k, std::uint32_t wor
   GlobalUnit &own = units[k];
   const Duration stop = own.limit - own.jitter - own.volume + 1;
   const auto window = [&](Duration d) { return d + own.volume - 1; };
-  for (GlobalUnit &other : units.first(k)) forget_jobs(other);
   Duration d = std::max(start, first_window(units.first(k), 0, workers));
   const bool found =
       least_fixed_point(stop, d, [&](Duration w) { return guan_window(units.first(k), window(w), w, workers); });
