@@ -171,12 +171,6 @@ class Checker {
       findings_.error(field, is_deadline ? FieldSet(Field::Period) : FieldSet(), std::move(mistake), std::move(hint));
     });
     check_against_wcet(task);
-    if (task.activation == Activation::Timer && task.period > 0 && task.jitter > task.period) {
-      findings_.error(Field::Jitter, Field::Period,
-                      fmt::format("jitter {} of task '{}' exceeds its period {}", format_duration(task.jitter),
-                                  task.name, format_duration(task.period)),
-                      "a release would overtake the previous one");
-    }
   }
 
   void check_against_wcet(const Task &task) {

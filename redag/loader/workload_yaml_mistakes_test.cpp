@@ -167,8 +167,6 @@ INSTANTIATE_TEST_SUITE_P(
                 {"w.yaml:4:50: error: deadline must be greater than zero, not '0'"}},
         Mistake{with("wcet: 1ms, period: 1s, offset: -1ms"),
                 {"4:48: error: offset of task 't' must not be negative, not -1ms"}},
-        Mistake{with("wcet: 1ms, period: 1s, jitter: 2s"),
-                {"4:48: error: jitter 2s of task 't' exceeds its period 1s"}},
         Mistake{with("wcet: 1ms, period: 1s, activation: tmier"),
                 {"4:52: error: activation must be one of timer, data, event, not 'tmier' (did you mean 'timer'?)"}},
         Mistake{with("wcet: 1ms, period: 1s, criticality: [high]"),

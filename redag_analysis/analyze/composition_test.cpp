@@ -115,6 +115,8 @@ TEST(Composition, PublishedAndReportedCases) {
       // M. Harbour, M. Klein, J. Lehoczky, Fixed priority scheduling of periodic tasks with varying execution priority,
       // RTSS 1991.
       {"varying_priorities", {{"t1", 28'000}, {"t2", 98'000}, {"t3", 47'000}, {"t4", 195'000}, {"t5", 223'000}}},
+      // The second processor of a chain over CPU, bus and CPU: the jitter of T32 exceeds its period.
+      {"jitter_above_period", {{"cpu2.T31", 28'000}, {"cpu2.T32", 22'000}}},
       {"wait_below", {{"x.fast", 14'000}, {"x.slow", 149'000}}},
       {"robot", {{"joints.controller", 400}, {"state.ekf", 800}, {"vision.camera", 2700}, {"vision", 32'200}}},
   };

@@ -104,6 +104,7 @@ class CaseGenerator {
     if (limits_.queues && chance(rng_, 0.5)) {
       single.overrun = Overrun::Queue;
       single.queue_depth = between(rng_, 1, 4);
+      single.jitter *= between(rng_, 1, 4);
     }
     if (workload.dags.empty() || chance(rng_, 0.7)) workload.dags.push_back(named_dag(workload));
     workload.dags.back().tasks.push_back(std::move(single));

@@ -198,7 +198,7 @@ Dag random_dag(Rng &rng, const RandomWorkloadLimits &limits) {
   inherit_periods(dag);
   for (Task &task : dag.tasks) {
     if (chance(rng, 0.3)) task.deadline = std::max(task.wcet, 10 * kMicrosecond * rng.uniform(1, 4));
-    if (task.activation == Activation::Timer && chance(rng, 0.15)) task.jitter = rng.uniform(1, task.period / 2);
+    if (task.activation == Activation::Timer && chance(rng, 0.15)) task.jitter = rng.uniform(1, 2 * task.period);
     if (dag.criticality == Criticality::High && chance(rng, 0.3)) task.wcet_low = rng.uniform(1, task.wcet);
   }
   return dag;
