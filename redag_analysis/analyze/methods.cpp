@@ -13,6 +13,7 @@
 #include "redag_analysis/many_workers/suspension_aware.hpp"
 #include "redag_analysis/one_worker/amc.hpp"
 #include "redag_analysis/one_worker/edf_demand.hpp"
+#include "redag_analysis/one_worker/offsets.hpp"
 #include "redag_analysis/one_worker/paper.hpp"
 #include "redag_analysis/one_worker/response_time.hpp"
 
@@ -24,6 +25,7 @@ const std::vector<Method> &methods() {
       rta_preemptive(),
       rta_nonpreemptive(),
       rta_deferred(),
+      offsets(),
       amc_rtb(),
       // One worker, edf
       edf_demand(),

@@ -19,9 +19,9 @@ inline constexpr Duration kUnbounded = kMaxDuration;
   return value >= kUnbounded ? kUnbounded : static_cast<Duration>(value);
 }
 
-/// Rounds up. Requires numerator >= 0 and denominator > 0.
+/// Rounds up. Requires denominator > 0.
 [[nodiscard]] constexpr Duration ceil_div(Duration numerator, Duration denominator) {
-  return numerator / denominator + (numerator % denominator != 0 ? 1 : 0);
+  return numerator / denominator + (numerator % denominator > 0 ? 1 : 0);
 }
 
 /// multiply() and add() saturate at kUnbounded and require non-negative arguments.

@@ -118,6 +118,7 @@ MostUrgent keep(const TaskSet &whole, std::uint32_t count) {
     kept.dags[unit.dag.value].units.push_back(id);
     kept.units.push_back(make_unit(kept, unit.dag, std::move(tasks)));
     // It stays a part of its DAG's one grid, also without edges.
+    kept.units.back().keeps_grid = unit.keeps_grid;
     kept.units.back().limit = std::min(kept.units.back().limit, unit.limit);
   }
   refuse_tasks(kept);

@@ -467,6 +467,7 @@ Unit make_unit(const TaskSet &task_set, DagId dag, std::vector<std::uint32_t> ta
   for (const std::uint32_t p : first.predecessors) {
     if (std::find(tasks.begin(), tasks.end(), p) == tasks.end()) unit.awaits.push_back(p);
   }
+  unit.keeps_grid = tasks.size() == 1 && first.predecessors.empty() && !first.data && !first.has_gaps;
   unit.limit = tasks.size() > 1 || !unit.awaits.empty() ? first.period : first.limit;
   unit.has_edges = tasks.size() > 1;  // also of a part of a unit, which can have none between its tasks
   unit.first_rank = unit.last_rank = first.rank;

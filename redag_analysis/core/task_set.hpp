@@ -139,6 +139,12 @@ struct Unit {
   std::uint32_t first_rank = 0;  // the most urgent of its tasks; last_rank: the least urgent
   std::uint32_t last_rank = 0;
   bool has_edges = false;
+  bool keeps_grid =
+      false;           // a timer that waits for none: job k is ready at `offset` + k `period`, or up to `jitter` later
+  Duration phase = 0;  // from the begin of a busy period to its first release that counts, as late as that is seen
+
+  /// How long before a busy period the first release that counts in it can be; negative: after it has begun.
+  [[nodiscard]] Duration ahead() const { return jitter - phase; }
 };
 
 struct CompiledDag {

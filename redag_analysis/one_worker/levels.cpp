@@ -23,8 +23,8 @@ Levels::Levels(const TaskSet &task_set)
     find_counted(unit);
     find_level(unit);
     const auto next = static_cast<std::uint32_t>(classes_.size());
-    const auto [found, is_new] = known.emplace(std::pair(unit.period, unit.jitter), next);
-    if (is_new) classes_.push_back(Interferer{0, unit.period, unit.jitter});
+    const auto [found, is_new] = known.emplace(std::pair(unit.period, unit.ahead()), next);
+    if (is_new) classes_.push_back(Interferer{0, unit.period, unit.ahead()});
     class_of_.push_back(found->second);
   }
   by_counted_ = task_set.by_rank;

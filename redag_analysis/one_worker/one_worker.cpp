@@ -38,7 +38,7 @@ bool fixed_point(Int128 start, std::span<const Interferer> more_urgent, Duration
     Effort::spend(more_urgent.size() + 1);
     const Duration next = demand(start, more_urgent, [w](const Interferer &other) {
       const Duration until = add(w, other.jitter);
-      return kDeferred ? until / other.period + 1 : ceil_div(until, other.period);
+      return kDeferred ? (until + other.period) / other.period : ceil_div(until, other.period);
     });
     if (next == w) return true;
     w = next;
@@ -161,7 +161,7 @@ FixedPoint no_fixed_point(int steps) {
 
 std::int64_t jobs_in(const Interferer &task, Duration window, bool deferred) {
   const Duration until = add(window, task.jitter);
-  return deferred ? until / task.period + 1 : ceil_div(until, task.period);
+  return deferred ? (until + task.period) / task.period : ceil_div(until, task.period);
 }
 
 FixedPoint preemptive_response(const Own &own, std::span<const Interferer> more_urgent) {

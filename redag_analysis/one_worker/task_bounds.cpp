@@ -24,8 +24,12 @@ Duration sum_of(const std::vector<Once> &all) {
 
 class TaskBounds {
  public:
-  TaskBounds(const TaskSet &task_set, bool deferred)
-      : task_set_(task_set), deferred_(deferred), levels_(task_set), ends_in_time_(task_set.units.size(), true) {
+  TaskBounds(const TaskSet &task_set, bool deferred, std::span<const std::uint32_t> units)
+      : task_set_(task_set),
+        deferred_(deferred),
+        asked_(units),
+        levels_(task_set),
+        ends_in_time_(task_set.units.size(), true) {
     bounds_.resize(task_set.tasks.size());
   }
 
@@ -38,7 +42,7 @@ class TaskBounds {
     std::size_t done = 0;
     for (const bool is_last : {true, false}) {
       for (const std::uint32_t t : order) {
-        if (task_set_.tasks[t].successors.empty() != is_last) continue;
+        if (task_set_.tasks[t].successors.empty() != is_last || !is_asked(t)) continue;
         Effort::reached(done++, order.size());
         bound(t);
         if (is_last && !bounds_[t].response) ends_in_time_[task_set_.tasks[t].unit] = false;
@@ -58,6 +62,10 @@ class TaskBounds {
     std::vector<Duration> ends;                   // by stage
     std::vector<Duration> longest;                // the ends of the job with the longest response
   };
+
+  [[nodiscard]] bool is_asked(std::uint32_t t) const {
+    return asked_.empty() || std::find(asked_.begin(), asked_.end(), task_set_.tasks[t].unit) != asked_.end();
+  }
 
   [[nodiscard]] const Unit &unit_of(std::uint32_t t) const { return task_set_.units[task_set_.tasks[t].unit]; }
 
@@ -79,7 +87,7 @@ class TaskBounds {
     if (!result.found) return;
     bound.response = result.found->response;
     bound.from_ready = result.found->from_ready;
-    if (Effort::itemises(u)) bound.terms = terms_of(t, window, *result.found);
+    if (Effort::itemises(u) && !window.longest.empty()) bound.terms = terms_of(t, window, *result.found);
   }
 
   // The work of others that became ready before the stage, of which the later stages know only a part.
@@ -105,7 +113,7 @@ class TaskBounds {
     window.ends.assign(window.stages.size(), 0);
     for (std::int64_t q = 0;; ++q) {
       const Int128 before = Int128{q} * window.instance;
-      const Duration stop = saturate(Int128{unit.limit} - unit.jitter + Int128{q} * unit.period - last_region);
+      const Duration stop = saturate(Int128{unit.limit} - unit.ahead() + Int128{q} * unit.period - last_region);
       for (std::size_t s = 0; s < window.stages.size(); ++s) {
         const bool is_last = s + 1 == window.stages.size();
         const Int128 start =
@@ -115,8 +123,8 @@ class TaskBounds {
         if (!settle(is_last && deferred_, start, window.others[s], stop, end, steps)) return no_fixed_point(steps);
       }
       const Duration end = add(window.ends.back(), last_region);
-      const auto response = static_cast<Duration>(Int128{unit.jitter} + end - Int128{q} * unit.period);
-      const auto from_ready = static_cast<Duration>(end - std::max(Int128{0}, Int128{q} * unit.period - unit.jitter));
+      const auto response = static_cast<Duration>(Int128{unit.ahead()} + end - Int128{q} * unit.period);
+      const auto from_ready = static_cast<Duration>(end - std::max(Int128{0}, Int128{q} * unit.period - unit.ahead()));
       const Duration longest = std::max(worst.from_ready, from_ready);
       if (response > worst.response) {
         worst = Response{response, window.ends.back(), q, 0};
@@ -125,7 +133,7 @@ class TaskBounds {
       worst.from_ready = longest;
       // The busy period is over if all work that arrived before is done when the next instance comes.
       const Int128 all = sum_of(window.once.back()) + before + window.instance;
-      const Duration next = saturate((Int128{q} + 1) * unit.period - unit.jitter);
+      const Duration next = saturate((Int128{q} + 1) * unit.period - unit.ahead());
       length = std::max(length, saturate(all));
       if (settle(false, all, window.others.front(), next, length, steps)) return FixedPoint{worst, {}};
       if (length <= next && length < kUnbounded) return no_fixed_point(steps);  // the steps ran out
@@ -182,7 +190,7 @@ class TaskBounds {
       const Unit &other = task_set_.units[u];
       if (&other == &unit || levels_.volume(u, window.stages.front().level) == 0) continue;
       const auto jobs = [&](std::size_t stage) {
-        return jobs_in({0, other.period, other.jitter}, window.longest[stage],
+        return jobs_in({0, other.period, other.ahead()}, window.longest[stage],
                        deferred_ && stage + 1 == window.stages.size());
       };
       Duration amount = 0;
@@ -193,14 +201,16 @@ class TaskBounds {
         volume = counted;
       }
       const std::size_t shown = levels_.volume(u, window.stages.back().level) > 0 ? window.stages.size() - 1 : 0;
-      terms.push_back(Term{Term::Kind::Interference, name(other), other.dag, amount, jobs(shown)});
+      if (amount > 0) terms.push_back(Term{Term::Kind::Interference, name(other), other.dag, amount, jobs(shown)});
     }
-    if (unit.jitter > 0) terms.push_back(Term{Term::Kind::Jitter, name(unit), unit.dag, unit.jitter, 0});
+    const auto kind = unit.ahead() > 0 ? Term::Kind::Jitter : Term::Kind::Earlier;
+    if (unit.ahead() != 0) terms.push_back(Term{kind, name(unit), unit.dag, unit.ahead(), 0});
     return terms;
   }
 
   const TaskSet &task_set_;
   bool deferred_;
+  std::span<const std::uint32_t> asked_;  // the units whose tasks are bounded; none: all
   Levels levels_;
   std::vector<bool> ends_in_time_;  // by unit: no task without successors lacks a bound
   std::vector<ResponseBound> bounds_;
@@ -208,8 +218,8 @@ class TaskBounds {
 
 }  // namespace
 
-Bound bound_tasks(const TaskSet &task_set, bool deferred) {
-  return from_tasks(task_set, TaskBounds(task_set, deferred).run());
+Bound bound_tasks(const TaskSet &task_set, bool deferred, std::span<const std::uint32_t> units) {
+  return from_tasks(task_set, TaskBounds(task_set, deferred, units).run());
 }
 
 }  // namespace redag::analysis::one_worker

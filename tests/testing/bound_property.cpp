@@ -126,8 +126,8 @@ void simulate_run(const BoundCase &bound_case, const analysis::TaskSet &task_set
   for (Dag &dag : workload.dags) {
     const std::vector<std::uint32_t> &units =
         task_set.dags[static_cast<std::size_t>(&dag - workload.dags.data())].units;
-    const bool joins_rates =
-        std::any_of(units.begin(), units.end(), [&](std::uint32_t u) { return !task_set.units[u].awaits.empty(); });
+    const auto awaits = [&](std::uint32_t u) { return !task_set.units[u].awaits.empty(); };
+    const bool joins_rates = property.keeps_grids || std::any_of(units.begin(), units.end(), awaits);
     const bool has_clocks =
         std::any_of(dag.tasks.begin(), dag.tasks.end(), [](const Task &task) { return task.phase != Phase::Common; });
     for (Task &task : dag.tasks) {

@@ -76,6 +76,7 @@ struct BoundPropertyOptions {
   std::string executor = "redag";  // one of executors::all(), under which the bound must hold
   /// Each task of a DAG of one rate is bounded from its source's release; otherwise from its own, as its deadline is.
   bool from_source = false;
+  bool keeps_grids = false;  // timers of a DAG keep their periods, and their offsets to each other
   /// Also asks the method about task sets that it must not bound as a whole.
   bool include_refused = false;
   /// Also tests bounds that a method itself calls unsound, to show that they are.
