@@ -121,6 +121,7 @@ Json schema_of(const fields::Row<Member> &row, const std::string &definition) {
   using T = decltype(type_of(row.member));
   const fields::Rule &rule = row.rule;
   if (row.field == Field::Offset) return {{"anyOf", {reference("duration"), {{"const", kAnyOffset}}}}};
+  if (row.field == Field::Group) return reference(definition);
   if constexpr (std::is_same_v<T, std::string>) return reference("name");
   if constexpr (std::is_same_v<T, Duration>) return reference(rule.least > 0 ? "positiveDuration" : "duration");
   if constexpr (std::is_same_v<T, std::uint32_t> || std::is_same_v<T, std::optional<int>>) {

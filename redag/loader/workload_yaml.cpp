@@ -178,12 +178,38 @@ class Reader : private yaml::ValueReader {
     } else {
       take(part, Field::Offset, task.offset, 0);
     }
+    if (const Node *groups = find(part, Field::Group)) {
+      const std::optional<std::string> group = group_of(*groups);
+      task.group = group.value_or("");
+      if (!group) part.broken |= Field::Group;
+    }
     take_criticality(task, part);
     take_activation(task, part);
     take_overrun(task, part);
     if (find(part, Field::Bcet) != nullptr && find(part, Field::Execution) == nullptr) {
       task.execution.kind = ExecutionTime::Kind::Uniform;
     }
+  }
+
+  /// A list joins its groups: no two jobs of any of them overlap, and none waits for one while it holds another.
+  std::optional<std::string> group_of(const Node &node) {
+    const std::string_view key = to_string(Field::Group);
+    if (node.kind != Node::Kind::Sequence || node.children.empty()) return text(node, key);
+    std::optional<std::string> first;
+    for (const Node &item : node.children) {
+      const std::optional<std::string> name = text(item, key);
+      if (!name) return std::nullopt;
+      if (!first) first = name;
+      if (joined(*name) != joined(*first)) groups_[joined(*name)] = joined(*first);
+    }
+    return first;
+  }
+  std::string joined(std::string name) {
+    for (auto at = groups_.find(name); at != groups_.end(); at = groups_.find(name)) {
+      if (const auto next = groups_.find(at->second); next != groups_.end()) at->second = next->second;
+      name = at->second;
+    }
+    return name;
   }
 
   void take_activation(Task &task, TaskPart &part) {
@@ -379,6 +405,7 @@ class Reader : private yaml::ValueReader {
     }
     for (std::size_t d = 0; d < workload_.dags.size(); ++d) {
       Dag &dag = workload_.dags[d];
+      for (Task &task : dag.tasks) task.group = joined(std::move(task.group));
       std::vector<std::uint32_t> order(dag.tasks.size());
       if (!unsound[d]) {
         const std::vector<std::uint32_t> ranks = topological_ranks(dag);
@@ -460,6 +487,7 @@ class Reader : private yaml::ValueReader {
   Part root_;
   Part platform_;
   std::vector<DagPart> dags_;
+  std::unordered_map<std::string, std::string> groups_;  // that lists name after another one, and that one
   Workload workload_;
   bool structure_known_ = false;
 };

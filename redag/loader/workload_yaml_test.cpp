@@ -139,6 +139,24 @@ dags:
   EXPECT_EQ(second.execution.samples, (std::vector<Duration>{kMillisecond, 500 * kMicrosecond}));
 }
 
+// A list joins its groups for all tasks, also those that name one of them alone.
+TEST(ParseWorkload, ListsOfGroupsAreJoined) {
+  const Workload workload = read(R"(
+dags:
+  - name: d
+    period: 1s
+    tasks:
+      - {name: a, wcet: 1ms, group: [r1, r2]}
+      - {name: b, wcet: 1ms, group: r3}
+      - {name: c, wcet: 1ms, group: [r3, r2, r3]}
+      - {name: d, wcet: 1ms, group: r1}
+      - {name: e, wcet: 1ms, group: [other]}
+)");
+  const std::vector<Task> &tasks = workload.dags.at(0).tasks;
+  for (const std::size_t t : {1U, 2U, 3U}) EXPECT_EQ(tasks.at(t).group, tasks.at(0).group);
+  EXPECT_EQ(tasks.at(4).group, "other");
+}
+
 TEST(ParseWorkload, ReadsRates) {
   const Workload workload = read(R"(
 dags:

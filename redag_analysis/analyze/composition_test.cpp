@@ -118,6 +118,8 @@ TEST(Composition, PublishedAndReportedCases) {
       // The second processor of a chain over CPU, bus and CPU: the jitter of T32 exceeds its period.
       {"jitter_above_period", {{"cpu2.T31", 28'000}, {"cpu2.T32", 22'000}}},
       {"wait_below", {{"x.fast", 14'000}, {"x.slow", 149'000}}},
+      // One job of b, started an instant before, holds what a needs.
+      {"two_resources", {{"x.a", 4000}, {"x.b", 4000}}},
       // N. Audsley, University of York YCS 164, 1991. Exact: the schedule repeats.
       {"offsets", {{"x.A", 1000}, {"x.B", 2000}, {"x.C", 6000}, {"x.D", 9000}, {"x.E", 13'000}, {"x.F", 30'000}}},
       {"robot", {{"joints.controller", 400}, {"state.ekf", 800}, {"vision.camera", 2700}, {"vision", 32'200}}},
