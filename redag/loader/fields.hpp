@@ -69,7 +69,7 @@ inline constexpr std::tuple kPlatform = {
     row(Field::Clusters, "clusters", nullptr, "none",
         "list of [clusters](#a-cluster), 1 to 64, in place of `platform.workers`"),
     row(Field::Devices, "devices", &Platform::devices, "none",
-        "map of names to [devices](#devices-and-segments), at most 64; not with clusters"),
+        "map of names to [devices](#devices-and-segments), at most 64; clusters share them"),
 };
 
 inline constexpr std::tuple kCluster = {
@@ -85,7 +85,8 @@ inline constexpr std::tuple kDevice = {
     row(Field::Slots, "slots", &Device::slots, nullptr, "jobs that it serves at the same time",
         {.most = kMaxSlots, .is_stated = true}),
     row(Field::Queue, "queue", &Device::queue, nullptr,
-        "`priority`: the first in the order of jobs comes next; `fifo`: the one that asked first", {.is_stated = true}),
+        "`priority`: the first in the order of jobs comes next; `fifo`: the one that asked first; clusters need it",
+        {.is_stated = true}),
 };
 
 inline constexpr std::tuple kDag = {

@@ -110,10 +110,6 @@ void check_devices(const Platform &platform, FindingList &findings) {
     findings.error(Field::Devices, {},
                    fmt::format("there are {} devices; at most {} are allowed", devices.size(), kMaxDevices));
   }
-  if (!devices.empty() && !platform.clusters.empty()) {
-    findings.error(Field::Devices, Field::Clusters, "the platform has both devices and clusters",
-                   "no order of jobs spans two clusters: remove 'devices:' or 'clusters:'");
-  }
   std::unordered_set<std::string_view> names;
   for (std::size_t d = 0; d < devices.size(); ++d) {
     const Device &device = devices[d];
@@ -125,6 +121,10 @@ void check_devices(const Platform &platform, FindingList &findings) {
     } else if (!names.insert(device.name).second) {
       refuse(Field::Devices, fmt::format("the name '{}' is used by another device", device.name),
              "choose a unique name for each device");
+    }
+    if (!platform.clusters.empty() && device.queue == Device::Queue::Priority) {
+      refuse(Field::Clusters,
+             fmt::format("device '{}' needs 'queue: fifo': no order of jobs spans two clusters", device.name));
     }
     check_numbers(device, fields::kDevice, fmt::format(" of device '{}'", device.name), refuse);
   }

@@ -54,11 +54,6 @@ void check_waits(const Workload &workload, const Task &task, bool allowed, Findi
         fmt::format("task '{}' has {} waits; at most {} are allowed", task.name, task.waits.size(), kMaxWaits));
     return;
   }
-  if (!workload.platform.clusters.empty()) {
-    findings.error(Field::Segments, Field::Clusters,
-                   fmt::format("task '{}' has segments, but the platform has clusters", task.name),
-                   "waits are known within one order of jobs only: remove 'clusters:', or state 'wcet:'");
-  }
   for (std::size_t w = 0; w < task.waits.size(); ++w) check_wait(workload, task, w, findings);
   if (longest_waits(task) > kMaxDuration - task.wcet) {
     findings.error(Field::Segments, {},

@@ -8,9 +8,9 @@
 #include <fmt/format.h>
 
 #include "redag/base/check.hpp"
+#include "redag/base/int128.hpp"
 
 namespace redag {
-
 std::optional<std::size_t> cluster_of(const Platform &platform, const Dag &dag) {
   const std::vector<Cluster> &clusters = platform.clusters;
   if (dag.cluster.empty() && clusters.size() == 1) return std::size_t{0};
@@ -55,7 +55,19 @@ std::vector<ClusterPart> parts_of(const Workload &workload) {
     part.workload.dags.push_back(dag);
     part.workload.dags.back().cluster.clear();
     part.dags.emplace_back(d);
-    for (std::size_t i = 0; i < dag.tasks.size(); ++i) part.tasks.emplace_back(next_task++);
+    for (const Task &task : dag.tasks) {
+      part.tasks.emplace_back(next_task++);
+      std::vector<Duration> longest(platform.devices.size(), 0);
+      for (const Wait &wait : task.waits) {
+        if (wait.device.valid()) longest[wait.device.value] = std::max(longest[wait.device.value], wait.longest);
+      }
+      // In a queue of requests, each job of another cluster can be ahead with one.
+      for (std::size_t i = 0; i < parts.size() * longest.size(); ++i) {
+        Duration &others = parts[i % parts.size()].workload.platform.devices[i / parts.size()].others;
+        const Int128 more = i % parts.size() == *cluster ? 0 : Int128{longest[i / parts.size()]} * task.concurrency;
+        others = static_cast<Duration>(std::min<Int128>(others + more, kMaxDuration));
+      }
+    }
   }
   return parts;
 }

@@ -84,9 +84,9 @@ TEST(Segments, MistakesAreNamedAtTheirPlaces) {
   expect_mistake(file("wcet: 1ms", "gpu: {queue: lifo}"), "queue");
   expect_mistake(file("wcet: 1ms", "gpu: , gpu: "), "1:29: error: the name 'gpu' is used by another device");
   expect_mistake(
-      "platform: {clusters: [{name: c}]}\ndags: [{name: d, tasks: [{name: t, period: 1s, segments: [{cpu: "
-      "1ms}, {wait: 1ms}, {cpu: 1ms}]}]}]\n",
-      "task 't' has segments, but the platform has clusters");
+      "platform: {clusters: [{name: c}], devices: {gpu: {queue: priority}}}\n"
+      "dags: [{name: d, tasks: [{name: t, period: 1s, wcet: 1ms}]}]\n",
+      "device 'gpu' needs 'queue: fifo': no order of jobs spans two clusters");
 }
 
 TEST(Segments, LongerThanTheDeadlineAreAWarning) {

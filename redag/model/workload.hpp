@@ -191,6 +191,7 @@ struct Device {
   std::string name;
   std::uint32_t slots = 1;  // jobs that it serves at the same time
   Queue queue = Queue::Priority;
+  Duration others = 0;  // in the part of a cluster: the longest time for which others use it before a request
 
   friend bool operator==(const Device &, const Device &) = default;
 };

@@ -13,18 +13,20 @@ namespace redag::analysis {
 namespace {
 
 // The waits of the task's own jobs.
-WaitingTime own_waits(const Task &task, std::size_t devices) {
+WaitingTime own_waits(const Task &task, const std::vector<Device> &devices) {
   WaitingTime time;
-  time.devices.resize(devices);
+  time.devices.resize(devices.size());
   for (const Wait &wait : task.waits) {
     if (!wait.device.valid()) {
       time.elsewhere = add(time.elsewhere, wait.longest);
       continue;
     }
     DeviceUse &use = time.devices[wait.device.value];
+    // What other clusters ask before a request is as if its own service took longer.
+    const Duration service = add(wait.longest, devices[wait.device.value].others);
     ++use.requests;
-    use.service = add(use.service, wait.longest);
-    use.longest = std::max(use.longest, wait.longest);
+    use.service = add(use.service, service);
+    use.longest = std::max(use.longest, service);
   }
   return time;
 }
@@ -41,7 +43,7 @@ std::vector<WaitingTime> waiting_times(const Workload &workload) {
   std::vector<WaitingTime> times;
   if (!has_waits(workload)) return times;
   const std::vector<Device> &devices = workload.platform.devices;
-  for (const TaskRef &task : flatten(workload)) times.push_back(own_waits(*task.task, devices.size()));
+  for (const TaskRef &task : flatten(workload)) times.push_back(own_waits(*task.task, devices));
   const std::vector<sched::Priority> priorities =
       sched::assign_priorities(workload.dags, workload.policy, workload.ties, 0);
   for (std::size_t t = 0; t < times.size(); ++t) {

@@ -4,6 +4,7 @@
 #include "redag_analysis/executors/clustered.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include "redag/base/check.hpp"
 
@@ -19,7 +20,11 @@ namespace {
 
 ClusteredScheduler::ClusteredScheduler(const Workload &workload, const Factory &make)
     : parts_(parts_of(workload)), places_(places_in(parts_)) {
-  for (const ClusterPart &part : parts_) schedulers_.push_back(make(part));
+  for (const Device &device : workload.platform.devices) devices_.push_back(Shared{device.slots, 0, {}});
+  for (ClusterPart &part : parts_) {
+    for (Device &device : part.workload.platform.devices) device.slots = std::numeric_limits<std::uint32_t>::max();
+    schedulers_.push_back(make(part));
+  }
   std::size_t next_task = 0;
   for (const Dag &dag : workload.dags) {
     std::vector<TaskId> &tasks = tasks_of_.emplace_back();
@@ -41,6 +46,37 @@ void ClusteredScheduler::complete(JobSlot job, Time now, sched::Outcome outcome)
 
 void ClusteredScheduler::preemption_point(JobSlot job, Time now) { of(job).preemption_point(local(job), now); }
 
+void ClusteredScheduler::wait(JobSlot job, DeviceId device, Time now) {
+  if (device.valid()) asked_[job.value] = device.value;
+  of(job).wait(local(job), device, now);
+}
+
+void ClusteredScheduler::wake(JobSlot job, Time now) {
+  if (const auto device = asked_.find(job.value); device != asked_.end()) {
+    --devices_[device->second].used;
+    asked_.erase(device);
+  }
+  of(job).wake(local(job), now);
+}
+
+void ClusteredScheduler::keep(const JobEvent &event) {
+  for (Request &request : devices_[static_cast<std::size_t>(event.value)].queue) {
+    if (request.serve.task == event.task && request.serve.number == event.job) request.event = event;
+  }
+}
+
+void ClusteredScheduler::serve(Time now) {
+  for (Shared &device : devices_) {
+    for (; device.used < device.slots && !device.queue.empty(); ++device.used) {
+      const Request &first = device.queue.front();
+      dispatches_.push_back(first.serve);
+      if (first.event) events_.push_back(*first.event);
+      if (first.event) events_.back().time = now;
+      device.queue.pop_front();
+    }
+  }
+}
+
 void ClusteredScheduler::exceed(JobSlot job, sched::Limit limit, Time now) { of(job).exceed(local(job), limit, now); }
 
 bool ClusteredScheduler::high_mode() const {
@@ -59,14 +95,19 @@ sched::Step ClusteredScheduler::dispatch(Time now, std::uint32_t most) {
       dispatch.over = whole(dispatch.over, p);
       dispatch.task = part.tasks[dispatch.task.value];
       if (dispatch.worker.valid()) dispatch.worker.value += part.first_worker;
-      dispatches_.push_back(dispatch);
+      if (dispatch.kind == sched::DispatchKind::Serve) {
+        devices_[asked_.at(dispatch.job.value)].queue.push_back(Request{dispatch, std::nullopt});
+      } else {
+        dispatches_.push_back(dispatch);
+      }
     }
     for (JobEvent event : step.events) {
       event.task = part.tasks[event.task.value];
       if (event.worker != WorkerId::kNoneValue) event.worker += part.first_worker;
-      events_.push_back(event);
+      event.kind == JobEventKind::Served ? keep(event) : events_.push_back(event);
     }
   }
+  serve(now);
   return sched::Step{dispatches_, events_};
 }
 

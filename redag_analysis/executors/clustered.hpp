@@ -2,12 +2,16 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The schedulers of all clusters behind one interface, for a driver that runs them on one time line. Its ids and
-// workers are those of the whole workload; each cluster's scheduler has its own (ClusterPart). Not thread-safe.
+// workers are those of the whole workload; each cluster's scheduler has its own (ClusterPart). Clusters share the
+// devices, which serve requests in their order. Not thread-safe.
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <memory>
+#include <optional>
+#include <unordered_map>
 #include <vector>
 
 #include "redag/model/clusters.hpp"
@@ -27,6 +31,8 @@ class ClusteredScheduler final : public sched::Scheduler {
   void miss(TaskId task, Time nominal, Time now, Reason reason) override;
   void complete(JobSlot job, Time now, sched::Outcome outcome) override;
   void preemption_point(JobSlot job, Time now) override;
+  void wait(JobSlot job, DeviceId device, Time now) override;
+  void wake(JobSlot job, Time now) override;
   void exceed(JobSlot job, sched::Limit limit, Time now) override;
   /// True if one of the clusters is in HI mode.
   [[nodiscard]] bool high_mode() const override;
@@ -48,6 +54,19 @@ class ClusteredScheduler final : public sched::Scheduler {
   [[nodiscard]] std::uint64_t thread_waits() const override;
 
  private:
+  // A cluster's scheduler believes that its devices serve each request at once. What it decides is kept until they do.
+  struct Request {
+    sched::Dispatch serve;
+    std::optional<JobEvent> event;
+  };
+  struct Shared {
+    std::uint32_t slots = 1;
+    std::uint32_t used = 0;
+    std::deque<Request> queue;
+  };
+
+  void keep(const JobEvent &event);
+  void serve(Time now);
   [[nodiscard]] sched::Scheduler &of(TaskId task) const { return *schedulers_[places_[task.value].part]; }
   [[nodiscard]] sched::Scheduler &of(JobSlot job) const { return *schedulers_[job.value % schedulers_.size()]; }
   [[nodiscard]] TaskId local(TaskId task) const { return places_[task.value].task; }
@@ -60,7 +79,9 @@ class ClusteredScheduler final : public sched::Scheduler {
   std::vector<TaskPlace> places_;
   std::vector<std::unique_ptr<sched::Scheduler>> schedulers_;
   std::vector<std::vector<TaskId>> tasks_of_;  // by DagId
-  std::vector<sched::Dispatch> dispatches_;    // of the last step, like the events
+  std::vector<Shared> devices_;
+  std::unordered_map<std::uint32_t, std::uint32_t> asked_;  // by JobSlot: the device that it asked
+  std::vector<sched::Dispatch> dispatches_;                 // of the last step, like the events
   std::vector<JobEvent> events_;
 };
 

@@ -5,6 +5,16 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "redag/loader/workload_yaml.hpp"
+#include "redag/sched/priority_scheduler.hpp"
+#include "redag_analysis/executors/clustered.hpp"
+#include "redag_analysis/metrics/jobs.hpp"
+#include "redag_analysis/sim/simulator.hpp"
 #include "tests/testing/builders.hpp"
 
 namespace redag::executors {
@@ -41,6 +51,37 @@ TEST(Executors, MakeSchedulersThatDifferInWhoIsFirst) {
     ASSERT_EQ(step.dispatches.size(), 1U) << kind.name;
     EXPECT_EQ(step.dispatches[0].task, TaskId(kind.name == "redag" ? 1 : 0)) << kind.name;
   }
+}
+
+// A request of the other cluster is ahead; nothing else delays the three jobs.
+TEST(Clustered, ClustersShareADevice) {
+  const auto loaded = parse_workload(R"(
+platform: {clusters: [{name: a}, {name: b}], devices: {gpu: {slots: 1, queue: fifo}}}
+dags:
+  - {name: x, cluster: a, tasks: [{name: t, period: 1s, segments: [{cpu: 4ms}, {device: gpu, for: 16ms}, {cpu: 1ms}]}]}
+  - name: y
+    cluster: b
+    tasks:
+      - {name: t, period: 1s, offset: 2ms, segments: [{cpu: 3ms}, {device: gpu, for: 8ms}, {cpu: 3ms}]}
+      - {name: u, period: 1s, offset: 6ms, segments: [{cpu: 1ms}, {device: gpu, for: 2ms}, {cpu: 1ms}]}
+)",
+                                     "shared.yaml", {.waits = true});
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  ClusteredScheduler scheduler(loaded->workload, [](const ClusterPart &part) {
+    return std::make_unique<sched::PriorityScheduler>(part.workload, sched::config_of(part.workload));
+  });
+  sim::Options options;
+  options.horizon = kSecond;
+  std::vector<JobEvent> events;
+  static_cast<void>(sim::simulate(loaded->workload, scheduler, 2, options, [&](std::span<const JobEvent> some) {
+    events.insert(events.end(), some.begin(), some.end());
+    return true;
+  }));
+  std::map<std::uint32_t, Duration> found;
+  for (const metrics::JobRecord &job : metrics::fold_jobs(loaded->workload, events)) {
+    found[job.task.value] = job.response() / kMillisecond;
+  }
+  EXPECT_EQ(found, (std::map<std::uint32_t, Duration>{{0, 21}, {1, 29}, {2, 26}}));
 }
 
 TEST(ExecutorsDeathTest, AnUnknownNameIsAMistakeOfTheCaller) {

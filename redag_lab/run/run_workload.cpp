@@ -87,6 +87,9 @@ class Run {
       return make_error("the platform has clusters, whose processors are not chosen by --affinity",
                         "change 'cpus:' of the clusters in the file");
     }
+    if (parts_.size() > 1 && !workload_.platform.devices.empty()) {
+      return make_error("clusters that share devices can be simulated and analysed only: no executor spans clusters");
+    }
     bodies_ = synthetic_bodies(workload_, options_.seed, give_up_);
     if (options_.bodies) {
       bodies_ = options_.bodies(std::move(bodies_), [this] { return instances_.empty() ? Time{0} : time_now(); });

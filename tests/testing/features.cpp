@@ -158,8 +158,7 @@ const char *why_never_together(Feature a, Feature b) {
     return "only full preemption has levels, and one thread a job";
   if (a == Feature::SharedLevels && (b == Feature::Edf || b == Feature::Fifo)) return "jobs have no levels";
   if (a == Feature::Fifo && b == Feature::FixedTies) return "fifo has no ties";
-  if (a >= Feature::Waits && b == Feature::Clusters)
-    return "the loader refuses it: no order of jobs spans two clusters";
+  if (a == Feature::PriorityDevices && b == Feature::Clusters) return "no order of jobs spans two clusters";
   return nullptr;
 }
 

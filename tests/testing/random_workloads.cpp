@@ -228,18 +228,18 @@ Workload contended(Rng &rng, bool overload) {
   return workload;
 }
 
-std::vector<Device> random_devices(Rng &rng) {
+std::vector<Device> random_devices(Rng &rng, bool has_order) {
   std::vector<Device> devices(between(rng, 0, 2));
   for (std::size_t d = 0; d < devices.size(); ++d) {
     devices[d].name = fmt::format("device{}", d);
     devices[d].slots = between(rng, 1, 2);
-    devices[d].queue = chance(rng, 0.7) ? Device::Queue::Priority : Device::Queue::Fifo;
+    devices[d].queue = chance(rng, has_order ? 0.7 : 0) ? Device::Queue::Priority : Device::Queue::Fifo;
   }
   return devices;
 }
 
 void add_waits(Rng &rng, Workload &workload) {
-  workload.platform.devices = random_devices(rng);
+  workload.platform.devices = random_devices(rng, workload.platform.clusters.empty());
   const auto devices = static_cast<std::uint32_t>(workload.platform.devices.size());
   for (Dag &dag : workload.dags) {
     for (Task &task : dag.tasks) {
@@ -308,9 +308,8 @@ RandomRun random_run(Rng &rng) {
   }
   if (moderate) relieve(rng, workload);
   if (moderate && has_modes(workload)) simplify(rng, workload);
-  if (chance(rng, 0.25)) {
-    divide(rng, workload);
-  } else if (chance(rng, 0.4)) {
+  if (chance(rng, 0.25)) divide(rng, workload);
+  if (chance(rng, 0.35)) {
     add_waits(rng, workload);
     if (moderate) relieve(rng, workload);
   }

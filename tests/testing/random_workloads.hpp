@@ -42,7 +42,7 @@ struct RandomWorkloadLimits {
 [[nodiscard]] Workload contended(Rng &rng, bool overload = true);
 
 /// No, one or two devices of one or two slots.
-[[nodiscard]] std::vector<Device> random_devices(Rng &rng);
+[[nodiscard]] std::vector<Device> random_devices(Rng &rng, bool has_order = true);
 
 /// Adds devices, and waits to about half of the tasks.
 void add_waits(Rng &rng, Workload &workload);

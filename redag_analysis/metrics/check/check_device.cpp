@@ -126,7 +126,8 @@ void DeviceRules::end_of_instant() {
     const DeviceState &state = devices_[d];
     const Device &device = device_at(static_cast<std::int64_t>(d));
     const Replay::JobRef first = state.queue.empty() ? Replay::JobRef{} : state.queue.front().job;
-    context_.expect(Rule::Device, state.queue.empty() || state.used >= device.slots, first.task, first.number,
+    const bool is_used = state.used >= device.slots || device.others > 0;  // perhaps by another cluster
+    context_.expect(Rule::Device, state.queue.empty() || is_used, first.task, first.number,
                     [&] { return "it waits for device " + device.name + ", which has a free slot"; });
   }
 }
