@@ -133,7 +133,7 @@ inline constexpr std::tuple kTask = {
     row(Field::Offset, "offset", &Task::offset, "0",
         "first release of a timer task; `any`: nothing synchronises it with others", {.least = 0, .is_joint = true}),
     row(Field::Jitter, "jitter", &Task::jitter, "0",
-        "longest delay with which a release of a timer task is seen; at most `period`", {.least = 0}),
+        "longest delay with which a release of a timer task is seen; releases keep their order", {.least = 0}),
     row(Field::Region, "region", &Task::region, "the whole job",
         "longest stretch without a preemption point, for the cooperative mode"),
     row(Field::Budget, "budget", &Task::budget, "none", "processor time after which `on_budget` applies to a job"),

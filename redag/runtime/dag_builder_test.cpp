@@ -165,7 +165,7 @@ TEST(DagBuilder, NamesTheOptionOfAMistake) {
        "DagOptions::degrade"},
       {{}, {.wcet = 1ms, .bcet = 2ms}, "TaskOptions::bcet"},
       {{}, {.wcet_low = 1ms}, "TaskOptions::wcet_low"},
-      {{}, {.jitter = 20ms}, "TaskOptions::jitter"},
+      {{}, {.jitter = -1ms}, "TaskOptions::jitter"},
       {{}, {.region = -1ms}, "TaskOptions::region"},
       {{}, {.concurrency = 0}, "TaskOptions::concurrency"},
       {{}, {.concurrency = 2, .group = "g"}, "TaskOptions::concurrency"},

@@ -119,7 +119,7 @@ const char *Replay::apply_to(LiveJob &job, const JobEvent &event) {
       if (!job.started()) return "a job that has not started cannot use up its budget";
       if (job.exceeded) return "it used up its budget before";
       job.exceeded = true;
-      if (task(job.task).on_budget == OnBudget::Demote) demote(job);
+      if (task(job.task).on_budget == OnBudget::Demote) demote(job, false);
       return nullptr;
     case JobEventKind::HighMode:
     case JobEventKind::LowMode: break;
@@ -205,14 +205,15 @@ const char *Replay::change_mode(const JobEvent &event) {
   for (std::size_t t = 0; t < tasks_.size(); ++t) {
     if (!is_degradable(TaskId(t))) continue;
     for (LiveJob &job : tasks_[t].live) {
-      if (job.started()) demote(job);
+      if (job.started()) demote(job, true);
     }
   }
   return nullptr;
 }
 
-// The job loses what it inherited, and inherits from jobs that still wait for its group.
-void Replay::demote(LiveJob &job) {
+// The job loses what it inherited, and inherits from jobs that still wait for its group. When HI mode begins, those of
+// lower criticality go away.
+void Replay::demote(LiveJob &job, bool by_mode) {
   if (job.demoted) return;
   job.demoted = true;
   job.own.key = demoted_key(job.task);
@@ -221,7 +222,7 @@ void Replay::demote(LiveJob &job) {
   if (group == kNoGroup || config_.policy == PolicyKind::Fifo) return;
   for (const TaskId sharer : groups_[group].tasks) {
     const TaskState &task = tasks_[sharer.value];
-    const bool goes_away = high_mode() && is_degradable(sharer);
+    const bool goes_away = by_mode && is_degradable(sharer);
     if (task.gate == Gate::Group && !goes_away) job.raised.key = std::min(job.raised.key, task.waiter.urgency.key);
   }
 }

@@ -163,7 +163,7 @@ class Replay {
   LiveJob *find_mutable(TaskId task, std::uint32_t number);
   const char *apply_to(LiveJob &job, const JobEvent &event);
   const char *change_mode(const JobEvent &event);
-  void demote(LiveJob &job);
+  void demote(LiveJob &job, bool by_mode);
   [[nodiscard]] std::int64_t demoted_key(TaskId task) const;
   [[nodiscard]] bool waits_for_data(TaskId id) const;
   void hand_turn_on(const LiveJob &skipped, Reason reason);
