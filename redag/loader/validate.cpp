@@ -79,7 +79,7 @@ class Checker {
     findings_.error(Field::Group, Field::Cluster | Field::Clusters,
                     fmt::format("group '{}' spans two clusters: DAG '{}' is in '{}', and DAG '{}' is in '{}'",
                                 task.group, other.name, other.cluster, dag.name, dag.cluster),
-                    "put these DAGs into one cluster, or use two groups");
+                    "put these DAGs into one cluster, or use two groups; a list of groups joins them under one name");
   }
 
   void check_name(const std::string &name, std::string_view what) {

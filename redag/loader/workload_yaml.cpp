@@ -194,7 +194,10 @@ class Reader : private yaml::ValueReader {
   /// A list joins its groups: no two jobs of any of them overlap, and none waits for one while it holds another.
   std::optional<std::string> group_of(const Node &node) {
     const std::string_view key = to_string(Field::Group);
-    if (node.kind != Node::Kind::Sequence || node.children.empty()) return text(node, key);
+    if (node.kind != Node::Kind::Sequence) return text(node, key);
+    if (node.children.empty()) {
+      return error(node, "group is an empty list", "name one group or several, or leave it out");
+    }
     std::optional<std::string> first;
     for (const Node &item : node.children) {
       const std::optional<std::string> name = text(item, key);

@@ -150,7 +150,7 @@ std::vector<Change> changes_of(const Owner &is, const Owner &wanted, const Rows 
     if constexpr (requires { fields::text_of(wanted.*row.member); }) {
       const auto &value = wanted.*row.member;
       if (is.*row.member == value || (row.rule.is_joint && row.field != Field::Workers)) return;
-      const bool is_absent = row.absent != nullptr && value == Owner{}.*row.member;
+      const bool is_absent = row.absent != nullptr && !row.rule.is_stated && value == Owner{}.*row.member;
       changes.push_back({row.field, is_absent ? std::nullopt : std::optional(fields::text_of(value))});
     }
   });

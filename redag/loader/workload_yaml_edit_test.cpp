@@ -81,6 +81,17 @@ TEST(EditYaml, ChangesValuesInPlace) {
                                            {"priority: 3", "priority: -7"}}));
 }
 
+// A default that files state is written, too: a platform without keys would be no platform.
+TEST(EditYaml, WritesASingleWorker) {
+  for (const std::string platform :
+       {"platform: {workers: 4}", "platform:\n  workers: 4", "platform: {workers: 4, cpus: 0-3}"}) {
+    const std::string file =
+        "# kept\n" + platform + "\ndags: [{name: d, tasks: [{name: t, wcet: 1ms, period: 9ms}]}]\n";
+    const std::string out = edited(file, [](Workload &workload) { workload.platform.workers = 1; });
+    EXPECT_EQ(out, with(file, {{"workers: 4", "workers: 1"}}));
+  }
+}
+
 TEST(EditYaml, AddsKeysAfterTheName) {
   const std::string out = edited(kFile, [](Workload &workload) {
     workload.policy = PolicyKind::Fixed;

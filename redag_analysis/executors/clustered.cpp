@@ -41,21 +41,29 @@ void ClusteredScheduler::miss(TaskId task, Time nominal, Time now, Reason reason
 }
 
 void ClusteredScheduler::complete(JobSlot job, Time now, sched::Outcome outcome) {
+  forget_request(job);
   of(job).complete(local(job), now, outcome);
+}
+
+// The job may ask a device, or be served.
+void ClusteredScheduler::forget_request(JobSlot job) {
+  const auto asked = asked_.find(job.value);
+  if (asked == asked_.end()) return;
+  Shared &device = devices_[asked->second.device];
+  if (asked->second.is_served) --device.used;
+  std::erase_if(device.queue, [job](const Request &one) { return one.serve.job == job; });
+  asked_.erase(asked);
 }
 
 void ClusteredScheduler::preemption_point(JobSlot job, Time now) { of(job).preemption_point(local(job), now); }
 
 void ClusteredScheduler::wait(JobSlot job, DeviceId device, Time now) {
-  if (device.valid()) asked_[job.value] = device.value;
+  if (device.valid()) asked_[job.value] = Asked{device.value};
   of(job).wait(local(job), device, now);
 }
 
 void ClusteredScheduler::wake(JobSlot job, Time now) {
-  if (const auto device = asked_.find(job.value); device != asked_.end()) {
-    --devices_[device->second].used;
-    asked_.erase(device);
-  }
+  forget_request(job);
   of(job).wake(local(job), now);
 }
 
@@ -69,6 +77,7 @@ void ClusteredScheduler::serve(Time now) {
   for (Shared &device : devices_) {
     for (; device.used < device.slots && !device.queue.empty(); ++device.used) {
       const Request &first = device.queue.front();
+      asked_.at(first.serve.job.value).is_served = true;
       dispatches_.push_back(first.serve);
       if (first.event) events_.push_back(*first.event);
       if (first.event) events_.back().time = now;
@@ -96,7 +105,7 @@ sched::Step ClusteredScheduler::dispatch(Time now, std::uint32_t most) {
       dispatch.task = part.tasks[dispatch.task.value];
       if (dispatch.worker.valid()) dispatch.worker.value += part.first_worker;
       if (dispatch.kind == sched::DispatchKind::Serve) {
-        devices_[asked_.at(dispatch.job.value)].queue.push_back(Request{dispatch, std::nullopt});
+        devices_[asked_.at(dispatch.job.value).device].queue.push_back(Request{dispatch, std::nullopt});
       } else {
         dispatches_.push_back(dispatch);
       }

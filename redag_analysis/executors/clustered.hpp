@@ -59,6 +59,10 @@ class ClusteredScheduler final : public sched::Scheduler {
     sched::Dispatch serve;
     std::optional<JobEvent> event;
   };
+  struct Asked {
+    std::uint32_t device = 0;
+    bool is_served = false;
+  };
   struct Shared {
     std::uint32_t slots = 1;
     std::uint32_t used = 0;
@@ -66,6 +70,7 @@ class ClusteredScheduler final : public sched::Scheduler {
   };
 
   void keep(const JobEvent &event);
+  void forget_request(JobSlot job);
   void serve(Time now);
   [[nodiscard]] sched::Scheduler &of(TaskId task) const { return *schedulers_[places_[task.value].part]; }
   [[nodiscard]] sched::Scheduler &of(JobSlot job) const { return *schedulers_[job.value % schedulers_.size()]; }
@@ -80,8 +85,8 @@ class ClusteredScheduler final : public sched::Scheduler {
   std::vector<std::unique_ptr<sched::Scheduler>> schedulers_;
   std::vector<std::vector<TaskId>> tasks_of_;  // by DagId
   std::vector<Shared> devices_;
-  std::unordered_map<std::uint32_t, std::uint32_t> asked_;  // by JobSlot: the device that it asked
-  std::vector<sched::Dispatch> dispatches_;                 // of the last step, like the events
+  std::unordered_map<std::uint32_t, Asked> asked_;  // by JobSlot
+  std::vector<sched::Dispatch> dispatches_;         // of the last step, like the events
   std::vector<JobEvent> events_;
 };
 

@@ -45,7 +45,7 @@ std::string words(Cause cause, const std::string &by) {
     case Cause::Overrun: return "executed beyond its wcet";
     case Cause::Overhead: return "simulated overheads";
     case Cause::Preempted: return fmt::format("preempted; {} ran", by);
-    case Cause::DeviceQueue: return fmt::format("its device served {}", by);
+    case Cause::DeviceQueue: return "its device served " + (by.empty() ? "another cluster" : by);
     case Cause::Waited: return "waited without a worker, as the workload says";
     case Cause::OffProcessor: return "stood still: its body waited, or another program ran";
     case Cause::OnWorker: return "had a worker; its processor time is not known";

@@ -146,7 +146,9 @@ class ClusterWaits {
         if (other.state == State::Away && other.device == job.device) return by(Cause::DeviceQueue, &other);
       }
     }
-    return by(Cause::Unknown, nullptr);
+    // Otherwise it serves a job of another cluster.
+    const bool is_shared = part_.workload.platform.devices[static_cast<std::size_t>(job.device)].others > 0;
+    return by(is_shared ? Cause::DeviceQueue : Cause::Unknown, nullptr);
   }
 
   [[nodiscard]] Wait not_resumed(const LiveJob &job) const {

@@ -363,7 +363,12 @@ TEST(ClosingLines, NameTheWorstCallbackItsLikelyCauseAndWhatHelps) {
                               HasSubstr("control.slow, which executes for up to 60ms"), HasSubstr("real-time")));
 
   snapshot.mode.mode = redag::PreemptionMode::Os;  // preempts it: that is no cause any more
-  EXPECT_THAT(closing_lines(snapshot)[2], HasSubstr("more urgent: more workers"));
+  EXPECT_THAT(closing_lines(snapshot)[2],
+              HasSubstr("(25 of 100): it probably blocks, or waits for its callback group"));
+  std::swap(snapshot.tasks[0].stats.misses, snapshot.tasks[1].stats.misses);
+  snapshot.tasks[1].stats.execution_max = kMillisecond;
+  EXPECT_THAT(closing_lines(snapshot)[2], HasSubstr("waits for callbacks that are more urgent"));
+  std::swap(snapshot.tasks[0].stats.misses, snapshot.tasks[1].stats.misses);
 
   snapshot.tasks[0].stats.execution_p99 = snapshot.tasks[0].stats.execution_max = 12 * kMillisecond;
   EXPECT_THAT(closing_lines(snapshot)[2], HasSubstr("executes for up to 12ms, longer than its deadline of 10ms"));
@@ -374,9 +379,10 @@ TEST(ClosingLines, SayWhatIsNotKnownAndNotAsPromised) {
   snapshot.workers = 2;
   snapshot.warnings = {"the record is lost", "a limit is low"};
   snapshot.tasks = {late_one("/robot subscription /odd (0)", 100 * kMillisecond, 3)};
+  snapshot.deadlocks.push_back({.waiting = "a", .blocked = "b", .resource = "c", .text = "a waits for b"});
   snapshot.tasks[0].has_deadline = false;
   snapshot.tasks[0].stats.id.kind = redag::Callback::Kind::Subscription;
-  EXPECT_THAT(closing_lines(snapshot), ElementsAre(HasSubstr("not as promised: the record is lost and 1 other"),
+  EXPECT_THAT(closing_lines(snapshot), ElementsAre(HasSubstr("not as promised: the record is lost and 2 others"),
                                                    HasSubstr("0 callbacks, but not of /robot subscription /odd (0)"),
                                                    "0 jobs with deadlines, 0 missed"));
 }

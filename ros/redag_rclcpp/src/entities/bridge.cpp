@@ -78,7 +78,8 @@ void Bridge::wake() {
 }
 
 void Bridge::wait(std::chrono::nanoseconds timeout) {
-  // A thread in remove() still owns a member that `entries` releases. This thread, above all jobs, destroys none.
+  // A thread in remove() still owns a member that `entries` releases. This thread, above all jobs, destroys none, but
+  // for an entity whose last other owner goes between the look in keep_dropped() and the release a moment later.
   std::vector<Entry> entries;
   const struct Leave {
     ~Leave() {
@@ -97,6 +98,7 @@ void Bridge::wait(std::chrono::nanoseconds timeout) {
   {
     const redag::LockGuard guard(lock_);
     for (const auto &member : members_) entries.push_back(Entry{member, member->watched()});
+    dropped_.reserve(dropped_.size() + entries.size());
     waiter_ = std::this_thread::get_id();
     ++waits_;
   }

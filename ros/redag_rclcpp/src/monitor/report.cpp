@@ -124,20 +124,37 @@ std::string likely_cause(const CallbackStats &late, const Snapshot &snapshot) {
     return fmt::format("it executes for up to {}, longer than its deadline of {}: shorten it, or lengthen its period",
                        humanize_duration(late.execution_max), humanize_duration(late.deadline));
   }
-  const CallbackStats *longest = nullptr;
+  const CallbackStats *longest = nullptr;  // of the less urgent ones
+  bool is_most_urgent = true;
   for (const TaskFigures &task : snapshot.tasks) {
+    if (task.stats.period < late.period && task.stats.jobs.released > 0) is_most_urgent = false;
     if (task.stats.period <= late.period) continue;
     if (longest == nullptr || task.stats.execution_max > longest->execution_max) longest = &task.stats;
   }
+  const bool by_rate = snapshot.policy == redag::PolicyKind::RateMonotonic;
   const bool preempts = snapshot.mode.mode == redag::PreemptionMode::Os;
-  if (!preempts && longest != nullptr && longest->execution_max > late.deadline - late.execution_p50) {
+  if (by_rate && !preempts && longest != nullptr && longest->execution_max > late.deadline - late.execution_p50) {
     return fmt::format(
-        "it probably waits for less urgent callbacks such as {}, which executes for up to {}: allow real-time "
-        "priorities, so that it preempts them ('redag doctor' says how), or more workers",
+        "it probably waits for less urgent callbacks such as {}, which executes for up to {}: preemption os, more "
+        "workers, or a callback group of its own ('redag doctor' says what os needs)",
         longest->task, humanize_duration(longest->execution_max));
   }
-  return "it probably waits for callbacks that are more urgent: more workers, or longer periods of those ('redag why' "
-         "names them in a trace; the parameter 'trace' records one)";
+  return std::string(by_rate && !is_most_urgent
+                         ? "it probably waits for callbacks that are more urgent, or of its group"
+                         : "it probably blocks, or waits for its callback group or a processor") +
+         ": 'redag why' names the cause in a trace, which the parameter 'trace' records";
+}
+
+/// What breaks a promise at the end of a run.
+std::vector<std::string> broken_promises(const Snapshot &snapshot) {
+  std::vector<std::string> broken = snapshot.warnings;
+  for (const Deadlock &deadlock : snapshot.deadlocks) {
+    if (deadlock.ended == redag::kNever) broken.push_back(deadlock.text);
+  }
+  for (const TaskFigures &task : snapshot.tasks) {
+    if (task.bound && task.bound->exceeded > 0) broken.push_back(task.stats.task + " exceeded its bound");
+  }
+  return broken;
 }
 
 }  // namespace
