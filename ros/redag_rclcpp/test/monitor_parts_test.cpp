@@ -360,7 +360,7 @@ TEST(ClosingLines, NameTheWorstCallbackItsLikelyCauseAndWhatHelps) {
   EXPECT_EQ(lines[0], "preemption none on 1 worker: all was as promised");
   EXPECT_EQ(lines[1], "rates are known of 2 callbacks");
   EXPECT_THAT(lines[2], AllOf(HasSubstr("200 jobs with deadlines, 26 missed, most by control.fast (25 of 100)"),
-                              HasSubstr("control.slow, which executes for up to 60ms"), HasSubstr("real-time")));
+                              HasSubstr("control.slow, which executes for up to 60ms"), HasSubstr("preemption os")));
 
   snapshot.mode.mode = redag::PreemptionMode::Os;  // preempts it: that is no cause any more
   EXPECT_THAT(closing_lines(snapshot)[2],

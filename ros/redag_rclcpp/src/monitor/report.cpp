@@ -197,11 +197,11 @@ std::vector<std::string> closing_lines(const Snapshot &snapshot) {
     misses += stats.misses;
     if (stats.misses > 0 && (worst == nullptr || stats.misses > worst->stats.misses)) worst = &task;
   }
+  const std::vector<std::string> broken = broken_promises(snapshot);
   std::vector<std::string> lines;
   lines.push_back(
       fmt::format("preemption {} on {}: ", to_string(snapshot.mode.mode), redag::plural(snapshot.workers, "worker")) +
-      (snapshot.warnings.empty() ? "all was as promised"
-                                 : "not as promised: " + redag::join_first(snapshot.warnings, 1)));
+      (broken.empty() ? "all was as promised" : "not as promised: " + redag::join_first(broken, 1)));
   lines.push_back(fmt::format("rates are known of {}", redag::plural(known, "callback")) +
                   (unknown.empty() ? ""
                                    : ", but not of " + redag::join_first(unknown, kMostNames) +
