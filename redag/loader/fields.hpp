@@ -162,7 +162,7 @@ constexpr void for_each(const Rows &rows, const Visit &visit) {
 }
 
 template <class Member>
-inline constexpr bool has_member = !std::is_same_v<Member, std::nullptr_t>;
+inline constexpr bool kHasMember = !std::is_same_v<Member, std::nullptr_t>;
 
 /// The type of a value, also of one that may be absent.
 template <class T>
@@ -176,9 +176,9 @@ struct ValueOf<std::optional<T>> {
 
 /// True for a pointer to a member that is a duration or a count.
 template <class Member>
-inline constexpr bool has_number = false;
+inline constexpr bool kHasNumber = false;
 template <class Owner, class T>
-inline constexpr bool has_number<T Owner::*> = std::is_integral_v<T>;
+inline constexpr bool kHasNumber<T Owner::*> = std::is_integral_v<T>;
 
 /// Formats a value as a file states it.
 inline std::string text_of(const std::string &text) { return text; }
@@ -200,12 +200,12 @@ constexpr FieldSet all_of(const Rows &rows) {
 /// Returns the keys of a table, in its order.
 template <const auto &rows>
 const std::vector<std::string_view> &keys_of() {
-  static const std::vector<std::string_view> keys = [] {
+  static const std::vector<std::string_view> kKeys = [] {
     std::vector<std::string_view> all;
     for_each(rows, [&](const auto &row) { all.emplace_back(row.key); });
     return all;
   }();
-  return keys;
+  return kKeys;
 }
 
 }  // namespace redag::fields

@@ -56,7 +56,7 @@ std::string number_mistake(const fields::Row<Member> &row, const Owner &owner, c
 template <class Owner, class Rows, class Report>
 void check_numbers(const Owner &owner, const Rows &rows, const std::string &whose, const Report &report) {
   fields::for_each(rows, [&](const auto &row) {
-    if constexpr (fields::has_number<decltype(row.member)>) {
+    if constexpr (fields::kHasNumber<decltype(row.member)>) {
       if (std::string mistake = number_mistake(row, owner, whose); !mistake.empty())
         report(row.field, std::move(mistake));
     }

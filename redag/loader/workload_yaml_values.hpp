@@ -78,15 +78,16 @@ class ValueReader {
     const Node *node = find(map, key);
     if (node == nullptr) return true;
     auto read = value<typename fields::ValueOf<T>::type>(*node, key, least, most);
-    if (read) out = *std::move(read);
-    return read.has_value();
+    if (!read) return false;
+    out = *std::move(read);
+    return true;
   }
   /// Reads the fields of `map` that are not joint into `owner`. Returns those whose values are mistakes.
   template <class Owner, class Rows>
   FieldSet take_fields(const Node &map, Owner &owner, const Rows &rows) {
     FieldSet broken;
     fields::for_each(rows, [&](const auto &row) {
-      if constexpr (fields::has_member<decltype(row.member)>) {
+      if constexpr (fields::kHasMember<decltype(row.member)>) {
         const fields::Rule &rule = row.rule;
         if (!rule.is_joint && !take(map, row.key, owner.*row.member, rule.least, rule.most)) broken |= row.field;
       }
@@ -134,6 +135,7 @@ class ValueReader {
   template <class Enum>
   std::optional<Enum> one_of(const Node &node, std::string_view key) {
     std::vector<Enum> values;
+    values.reserve(std::size(kValues<Enum>));
     for (const Named<Enum> &named : kValues<Enum>) values.push_back(named.value);
     return one_of(node, key, std::span<const Enum>(values));
   }

@@ -32,12 +32,12 @@ constexpr auto kNone = [](Field) { return false; };
 /// know; then by its type, if it does not have its default.
 template <class Owner, class Rows, class WriteOwn>
 void write_fields(Writer &out, const Owner &owner, const Rows &rows, const WriteOwn &write_own) {
-  static const Owner defaults;
+  static const Owner kDefaults;
   fields::for_each(rows, [&](const auto &row) {
     if (write_own(row.field)) return;
     if constexpr (requires { fields::text_of(owner.*row.member); }) {
       const auto &value = owner.*row.member;
-      if (row.rule.is_stated || value != defaults.*row.member) out.write(row.key, fields::text_of(value));
+      if (row.rule.is_stated || value != kDefaults.*row.member) out.write(row.key, fields::text_of(value));
     }
   });
 }
