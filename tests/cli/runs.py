@@ -16,9 +16,10 @@ import shlex
 import signal
 import subprocess
 import time
+import unittest
 
 from pftrace import Picture
-from program import CART, PROGRAM, SOURCE, Case, body, in_terminal, interrupt, main, redag
+from program import CART, PROGRAM, SANITIZED, SOURCE, Case, body, in_terminal, interrupt, main, redag
 
 
 class Doctor(Case):
@@ -41,6 +42,7 @@ class Doctor(Case):
             self.assertTrue(line["why"] and line["mend"] and line["found"], line)
         self.assertEqual(sum(document[colour] for colour in ("green", "yellow", "red", "unknown")), len(lines))
 
+    @unittest.skipIf(SANITIZED, "a program with sanitizers has no real-time priorities, and does not notice")
     def test_without_rights_it_is_red(self):
         def without():
             resource.setrlimit(resource.RLIMIT_RTPRIO, (0, 0))
