@@ -77,7 +77,8 @@ std::string advice(Cause cause, const Setting &at) {
       return fmt::format("the wcet of {} is too small: measure it, correct it in the workload, and analyze again", x);
     case Cause::Overhead: return fmt::format("let {} do more in fewer jobs, or use a faster machine", x);
     case Cause::Preempted: return fmt::format("shorten {}, lengthen {} period, or add a worker", x, its);
-    case Cause::DeviceQueue: return fmt::format("shorten what the device does for {}, or add a slot", x);
+    case Cause::DeviceQueue:
+      return fmt::format("shorten what the device does for {}, or add a slot", x.empty() ? "another cluster" : x);
     case Cause::Waited: return "shorten the wait, or lengthen the deadline";
     case Cause::OffProcessor:
     case Cause::Unknown:

@@ -66,6 +66,16 @@ TEST(WhyRemedy, OfAnotherExecutorIsOurs) {
   EXPECT_THAT(remedy(*main, trace.info), Not(HasSubstr("preemption")));
 }
 
+// The device of a job may serve another cluster, whose jobs nobody names.
+TEST(WhyRemedy, OfADeviceThatServesAnotherCluster) {
+  const Workload workload = make_workload({make_dag("d", {{"a", 10, 3}})});
+  Culprit culprit;
+  culprit.cause = Cause::DeviceQueue;
+  culprit.delayed = TaskId(0);
+  EXPECT_THAT(remedy(culprit, testing::run_info(workload, "redag")),
+              HasSubstr("does for another cluster, or add a slot"));
+}
+
 Culprit culprit(Cause cause, std::uint32_t task, std::size_t main, Duration longest) {
   Culprit one;
   one.cause = cause;
