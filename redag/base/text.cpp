@@ -56,9 +56,7 @@ std::string find_unprintable(std::string_view text) {
   return {};
 }
 
-namespace {
-
-std::string written_out(std::string_view text, std::string_view kept) {
+std::string printable(std::string_view text, std::string_view kept) {
   std::string shown;
   shown.reserve(text.size());
   for (std::size_t i = 0; i < text.size();) {
@@ -78,16 +76,12 @@ std::string written_out(std::string_view text, std::string_view kept) {
   return shown;
 }
 
-}  // namespace
-
-std::string printable(std::string_view text) { return written_out(text, "\n\t"); }
-
 std::string in_quotes(std::string_view text) {
   constexpr std::size_t kLongest = 60;
-  if (text.size() <= kLongest) return "'" + written_out(text, {}) + "'";
+  if (text.size() <= kLongest) return "'" + printable(text, {}) + "'";
   std::size_t cut = kLongest;
   while (cut > 0 && (static_cast<unsigned char>(text[cut]) & 0xC0U) == 0x80) --cut;  // whole characters
-  return "'" + written_out(text.substr(0, cut), {}) + "...'";
+  return "'" + printable(text.substr(0, cut), {}) + "...'";
 }
 
 std::string format_percent(double ratio) {

@@ -39,9 +39,8 @@ inline constexpr const char *kMaxDurationText = "1281023h (146 years)";  // kMax
 /// can be shown.
 [[nodiscard]] std::string find_unprintable(std::string_view text);
 
-/// Returns `text` with each character that find_unprintable() finds written out: "\\u{1B}[2J". Keeps line feeds and
-/// tabs.
-[[nodiscard]] std::string printable(std::string_view text);
+/// Returns `text` with each character that find_unprintable() finds written out: "\\u{1B}[2J". Keeps those of `kept`.
+[[nodiscard]] std::string printable(std::string_view text, std::string_view kept = "\n\t");
 
 /// Quotes a user's text for a message: in quotes, printable, and cut if it is long.
 [[nodiscard]] std::string in_quotes(std::string_view text);

@@ -2,8 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Finds live pages and reads them into values. Pages are not trusted: a page is copied before it is examined, every
-// size in it is checked, and its names are made fit for a terminal. Pages that another user could have written are
-// refused. No state; any thread.
+// size in it is checked, and its names are made fit for a terminal. No state; any thread.
 #pragma once
 
 #include <cstddef>
@@ -36,10 +35,5 @@ struct Listed {
 /// Returns the pages of live processes, by pid and number. Removes those of dead processes where permitted. A folder
 /// that cannot be read gives no pages.
 [[nodiscard]] std::vector<Listed> list_pages(const std::string &folder);
-
-/// Removes the pages of dead processes; returns how many.
-std::size_t remove_stale_pages(const std::string &folder);
-
-[[nodiscard]] std::string page_path(const std::string &folder, std::int64_t pid, std::uint32_t number);
 
 }  // namespace redag::live

@@ -15,8 +15,8 @@
 #include <system_error>
 
 #include "redag/live/owned_file.hpp"
+#include "redag/live/pages.hpp"
 #include "redag/live/process.hpp"
-#include "redag/live/reader.hpp"
 
 namespace redag::live {
 namespace {

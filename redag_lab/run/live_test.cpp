@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "redag/engine/coroutine.hpp"
+#include "redag/live/pages.hpp"
 #include "redag/live/reader.hpp"
 #include "redag/runtime/async_event.hpp"
 #include "redag/runtime/device_handle.hpp"

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "redag/live/pages.hpp"
 #include "redag/live/reader.hpp"
 
 namespace redag::testing {
