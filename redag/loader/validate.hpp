@@ -30,6 +30,9 @@ inline constexpr std::size_t kMaxWaits = 64;  // of one task
 /// Says why `name` cannot stand in one-line messages and tables: "is empty", "contains U+001B, ...". Empty if it can.
 [[nodiscard]] std::string name_mistake(std::string_view name);
 
+/// The first reason why a platform cannot have these devices; empty if it can.
+[[nodiscard]] std::string device_mistake(const std::vector<Device> &devices);
+
 /// The parts of a workload; fields.hpp says what each may be. to_string() gives the key of the file format.
 enum class Field : std::uint8_t {
   Name,

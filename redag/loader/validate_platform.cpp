@@ -154,6 +154,15 @@ void check_load(double utilization, std::uint32_t workers, const std::string &wh
 
 }  // namespace
 
+std::string device_mistake(const std::vector<Device> &devices) {
+  Platform platform;
+  platform.devices = devices;
+  FindingList findings;
+  check_devices(platform, findings);
+  const std::vector<Finding> found = findings.take();
+  return found.empty() ? std::string() : found.front().message;
+}
+
 void check_platform(const Platform &platform, FindingList &findings) {
   if (platform.clusters.empty()) {
     check_numbers(platform, fields::kPlatform, "",

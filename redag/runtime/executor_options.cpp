@@ -35,23 +35,6 @@ void check_duration(const char *option, nanoseconds value) {
 
 }  // namespace
 
-void check_devices(const char *option, const std::vector<Device> &devices) {
-  if (devices.size() > kMaxDevices) {
-    refuse(fmt::format("{} has {} entries; at most {} are allowed", option, devices.size(), kMaxDevices));
-  }
-  for (std::size_t d = 0; d < devices.size(); ++d) {
-    const std::string place = fmt::format("{}[{}]", option, d);
-    if (const std::string why = name_mistake(devices[d].name); !why.empty()) {
-      refuse(fmt::format("{}: the name {} {}", place, in_quotes(devices[d].name), why));
-    }
-    for (std::size_t other = 0; other < d; ++other) {
-      if (devices[other].name != devices[d].name) continue;
-      refuse(fmt::format("{}: the name '{}' is used by another device (choose a unique one)", place, devices[d].name));
-    }
-    check_range("devices: slots", devices[d].slots, 1U, kMaxSlots);
-  }
-}
-
 [[noreturn]] void refuse(const std::string &what) { throw std::invalid_argument(what); }
 
 void check(const ExecutorOptions &options) {
@@ -66,7 +49,9 @@ void check(const ExecutorOptions &options) {
   }
   check_range("trace_capacity", options.trace_capacity, std::size_t{0}, kMaxTraceCapacity);
   check_range("record_bytes", options.record_bytes, kMinRecordBytes, kMaxRecordBytes);
-  check_devices("ExecutorOptions::devices", options.devices);
+  if (const std::string why = device_mistake(options.devices); !why.empty()) {
+    refuse("ExecutorOptions::devices: " + why);
+  }
   check_duration("spin", options.spin);
   check_duration("stop_timeout", options.stop_timeout);
   if (!options.watchdog) return;

@@ -95,7 +95,4 @@ struct ExecutorOptions {
   std::function<OnException(const ExceptionInfo &)> on_exception{};
 };
 
-/// Throws std::invalid_argument, which names `option`, if an executor cannot have these devices.
-void check_devices(const char *option, const std::vector<Device> &devices);
-
 }  // namespace redag::runtime

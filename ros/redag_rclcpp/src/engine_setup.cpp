@@ -5,10 +5,10 @@
 
 #include <chrono>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
 #include "redag/loader/validate.hpp"
-#include "redag/runtime/executor_options.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag/threads/threads.hpp"
 
@@ -22,7 +22,9 @@ ReDAGOptions prepare(ReDAGOptions options) {
         "default_period must be greater than 0, because callbacks with shorter periods are more urgent");
   }
   if (options.watchdog < nanoseconds(0)) throw std::invalid_argument("watchdog must not be negative");
-  redag::runtime::check_devices("ReDAGOptions::devices", options.devices);
+  if (const std::string why = redag::device_mistake(options.devices); !why.empty()) {
+    throw std::invalid_argument("ReDAGOptions::devices: " + why);
+  }
   if (!options.workload) return options;
   const auto findings = redag::validate(*options.workload, redag::ValidateOptions{.wcet_optional = true});
   if (has_errors(findings)) throw std::runtime_error(to_string(findings));
