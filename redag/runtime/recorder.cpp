@@ -14,11 +14,11 @@
 #include <system_error>
 #include <utility>
 
-#include "redag/loader/provenance.hpp"
 #include "redag/loader/text_file.hpp"
 #include "redag/threads/clock.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/output_file.hpp"
+#include "redag/trace/this_machine.hpp"
 
 namespace redag::runtime {
 namespace {
@@ -67,8 +67,7 @@ void Recorder::end_thread() {
 // A record needs at least one task.
 Result<void> Recorder::describe_again() {
   trace::RunInfo info = describe_();
-  info.machine = trace::this_machine();
-  info.provenance = current_provenance();
+  trace::add_provenance(info);
   described_at_ = monotonic_now();
   if (info.workload.dags.empty()) return {};
   const bool is_known = info.workload == described_ && info.removals == removals_ && info.settled == settled_;

@@ -13,6 +13,7 @@
 #include "redag/loader/text_file.hpp"
 #include "redag/loader/workload_yaml.hpp"
 #include "redag/trace/run_info_json.hpp"
+#include "redag/trace/this_machine.hpp"
 #include "tests/testing/builders.hpp"
 
 namespace redag::trace {

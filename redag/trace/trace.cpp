@@ -3,26 +3,7 @@
 
 #include "redag/trace/trace.hpp"
 
-#include <sched.h>
-
-#include <fstream>
-
 namespace redag::trace {
-namespace {
-
-// The first "model name" of /proc/cpuinfo; empty if there is none (most ARM kernels).
-std::string processor_name() {
-  std::ifstream file("/proc/cpuinfo");
-  std::string line;
-  while (std::getline(file, line)) {
-    if (line.rfind("model name", 0) != 0) continue;
-    const std::size_t text = line.find_first_not_of(": \t", line.find(':'));
-    return text == std::string::npos ? std::string() : line.substr(text);
-  }
-  return {};
-}
-
-}  // namespace
 
 bool has_valid_times(const JobEvent &event) {
   // A deadline lies after the end of the longest run by at most the longest deadline.
@@ -48,16 +29,6 @@ const char *preemption_name(sched::Preemption mode) {
     case sched::Preemption::Full: return "os";
   }
   return "?";
-}
-
-Machine this_machine() {
-  Machine machine;
-  cpu_set_t set;
-  CPU_ZERO(&set);
-  if (sched_getaffinity(0, sizeof set, &set) == 0) machine.cpus = static_cast<std::uint32_t>(CPU_COUNT(&set));
-  machine.kernel = kernel_name();
-  machine.model = processor_name();
-  return machine;
 }
 
 std::string task_name(const Workload &workload, TaskId task) {

@@ -111,9 +111,6 @@ struct Trace {
 [[nodiscard]] const char *to_string(Driver driver);
 [[nodiscard]] const char *preemption_name(sched::Preemption mode);
 
-/// Describes this machine, as far as the operating system allows.
-[[nodiscard]] Machine this_machine();
-
 /// For example "control.ekf" (DAG and task); "task 17" if there is no such task.
 [[nodiscard]] std::string task_name(const Workload &workload, TaskId task);
 

@@ -18,7 +18,7 @@
 #include "redag/threads/clock.hpp"
 #include "redag/threads/setup.hpp"
 #include "redag/threads/threads.hpp"
-#include "redag/trace/trace.hpp"
+#include "redag/trace/this_machine.hpp"
 #include "redag_analysis/text/rounded_time.hpp"
 #include "redag_lab/doctor/figures.hpp"
 #include "redag_lab/doctor/measured_jobs.hpp"

@@ -20,6 +20,7 @@
 #include "redag/threads/clock.hpp"
 #include "redag/threads/spins.hpp"
 #include "redag/threads/threads.hpp"
+#include "redag/trace/this_machine.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_lab/run/concurrency.hpp"
 #include "redag_lab/run/synthetic.hpp"
@@ -432,8 +433,7 @@ class Run {
     info.seed = options_.seed;
     info.end = options_.duration;
     info.warm_up = options_.warm_up;
-    info.machine = trace::this_machine();
-    info.provenance = current_provenance();
+    trace::add_provenance(info);
   }
 
   void warn() {

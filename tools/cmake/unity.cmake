@@ -44,7 +44,7 @@ if(NOT CMAKE_BUILD_TYPE STREQUAL "Debug")
   list(FILTER hot EXCLUDE REGEX "_test\\.cpp$")
   list(APPEND alone ${hot})
   # The rest gains nothing from -O3, and compiles in less time without it.
-  foreach(target IN ITEMS redag redag_core redag_analysis)
+  foreach(target IN ITEMS redag redag_core redag_engine redag_analysis)
     target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O2>)
   endforeach()
   list(TRANSFORM hot PREPEND ${PROJECT_SOURCE_DIR}/)

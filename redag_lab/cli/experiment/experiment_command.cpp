@@ -12,7 +12,7 @@
 #include "redag/base/check.hpp"
 #include "redag/base/text.hpp"
 #include "redag/base/words.hpp"
-#include "redag/trace/trace.hpp"
+#include "redag/trace/this_machine.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/files.hpp"
 #include "redag_lab/cli/terminal/options.hpp"

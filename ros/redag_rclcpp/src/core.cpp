@@ -412,8 +412,6 @@ redag::trace::RunInfo ReDAGExecutor::Core::run_info(std::vector<std::uint32_t> &
   info.settled = engine_->settled();
   info.origin = origin_;
   info.lost_events = engine_->lost_events();
-  info.machine = redag::trace::this_machine();
-  info.provenance = redag::current_provenance();
   for (const Deadlock &deadlock : notes_.deadlocks()) {
     info.remarks.push_back({.begun = deadlock.begun,
                             .ended = deadlock.ended,

@@ -21,6 +21,7 @@
 #include "mode_test.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "redag/engine/preemption_point.hpp"
+#include "redag/live/pages.hpp"
 #include "redag/live/reader.hpp"
 #include "redag/live/writer.hpp"
 #include "redag/loader/validate.hpp"

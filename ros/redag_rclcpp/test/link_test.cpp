@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// What the libraries of a robot load: the executor, and a library that uses only the executor, need nothing of the
-// analysis. `nm` and `readelf` of binutils tell.
+// What the libraries of a robot load: the executor, and a library that uses only the executor, need the core alone. No
+// analysis, no workload files, no recordings. `nm` and `readelf` of binutils tell.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -34,10 +34,12 @@ std::string loaded_by(const std::string &library) { return output_of("ldd '" + l
 /// What it defines and what it takes from others, also if a library was linked into it.
 std::string symbols_of(const std::string &library) { return output_of("nm --dynamic --demangle '" + library + "'"); }
 
-TEST(Link, TheExecutorNeedsNoAnalysis) {
-  EXPECT_THAT(needed_by(EXECUTOR), HasSubstr("libredag.so"));
-  EXPECT_THAT(needed_by(EXECUTOR), Not(HasSubstr("redag_analysis")));
-  EXPECT_THAT(loaded_by(EXECUTOR), Not(HasSubstr("redag_analysis")));
+TEST(Link, TheExecutorNeedsTheCoreAlone) {
+  EXPECT_THAT(needed_by(EXECUTOR), HasSubstr("libredag_core.so"));
+  for (const char *library : {"libyaml", "libz.so"}) EXPECT_THAT(needed_by(EXECUTOR), Not(HasSubstr(library)));
+  for (const char *library : {"libredag.so", "redag_analysis"}) {
+    EXPECT_THAT(loaded_by(EXECUTOR), Not(HasSubstr(library)));
+  }
   const std::string symbols = symbols_of(EXECUTOR);
   EXPECT_THAT(symbols, HasSubstr("redag_rclcpp::ReDAGExecutor::spin()"));
   for (const char *name : {"redag::analysis::", "redag::metrics::", "redag::sim::", "redag_rclcpp::Monitor"}) {
@@ -47,13 +49,14 @@ TEST(Link, TheExecutorNeedsNoAnalysis) {
 
 TEST(Link, AUserOfTheExecutorLoadsNoMonitor) {
   EXPECT_THAT(loaded_by(ROBOT), HasSubstr("libredag_rclcpp.so"));
-  EXPECT_THAT(loaded_by(ROBOT), Not(HasSubstr("redag_rclcpp_monitor")));
-  EXPECT_THAT(loaded_by(ROBOT), Not(HasSubstr("redag_analysis")));
+  for (const char *library : {"redag_rclcpp_monitor", "redag_analysis", "libredag.so"}) {
+    EXPECT_THAT(loaded_by(ROBOT), Not(HasSubstr(library)));
+  }
 }
 
 // Otherwise the cases above would find nothing whatever is linked.
-TEST(Link, TheMonitorTakesTheAnalysis) {
-  EXPECT_THAT(loaded_by(MONITOR), HasSubstr("redag_analysis"));
+TEST(Link, TheMonitorTakesThem) {
+  for (const char *library : {"redag_analysis", "libredag.so"}) EXPECT_THAT(loaded_by(MONITOR), HasSubstr(library));
   EXPECT_THAT(symbols_of(MONITOR), HasSubstr("redag::analysis::"));
 }
 

@@ -26,6 +26,7 @@
 #include "redag/base/mutex.hpp"
 #include "redag/threads/setup.hpp"
 #include "redag/threads/threads.hpp"
+#include "redag/trace/this_machine.hpp"
 #include "redag_analysis/metrics/check/trace_checker.hpp"
 #include "redag_rclcpp/executor.hpp"
 #include "workload_nodes.hpp"
@@ -239,8 +240,7 @@ class Run {
     info.overheads = fmt::format("ROS 2 {} transport; measuring costs {} per job; timers are within {} of the grid",
                                  options_.intra_process ? "intra-process" : "middleware", redag::format_duration(cost),
                                  redag::format_duration(nodes_->phase_error()));
-    info.machine = redag::trace::this_machine();
-    info.provenance = redag::current_provenance();
+    redag::trace::add_provenance(info);
     info.lost_events = nodes_->lost_events();
     if (info.lost_events > 0) {
       result_.warnings.push_back(fmt::format("{} events were lost: the figures are incomplete", info.lost_events));

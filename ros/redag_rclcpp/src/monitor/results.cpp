@@ -11,6 +11,7 @@
 #include <system_error>
 #include <utility>
 
+#include "redag/trace/this_machine.hpp"
 #include "redag/trace/trace.hpp"
 #include "redag_analysis/metrics/files/summary_json.hpp"
 
@@ -38,6 +39,7 @@ redag::Diagnostics TraceKeeper::write(const redag::metrics::FilesOptions &files,
     if (!written) problems.insert(problems.end(), written.error().begin(), written.error().end());
   };
   redag::trace::Trace trace = executor.as_trace(std::move(events_));
+  add_provenance(trace.info);
   // The kept events describe a run that ended with the last of them.
   if (is_cut_ && !trace.events.empty()) trace.info.end = trace.events.back().time;
 
@@ -80,7 +82,8 @@ redag::Result<void> RunRecord::describe(const std::vector<redag::JobEvent> &even
     deadlocks_ = std::max({deadlocks_, deadlock.begun, deadlock.ended == redag::kNever ? 0 : deadlock.ended});
   }
   if (is_known && was_learning == learning_ && before == deadlocks_) return {};
-  const redag::trace::RunInfo info = executor.run_info(positions_);
+  redag::trace::RunInfo info = executor.run_info(positions_);
+  add_provenance(info);
   if (file_) return file_->describe(info, positions_);
   return redag::trace::EventsWriter::record(path_, info, redag::trace::kMostRecordBytes, positions_)
       .map([this](redag::trace::EventsWriter &&file) { file_.emplace(std::move(file)); });
