@@ -4,8 +4,8 @@
 #include "redag_analysis/many_workers/dag_isolated.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <map>
-#include <numeric>
 
 #include "redag/sched/policy.hpp"
 #include "redag_analysis/core/arithmetic.hpp"
@@ -77,25 +77,41 @@ bool preempts_at_once(const TaskSet &task_set) {
          std::all_of(task_set.tasks.begin(), task_set.tasks.end(), has_own_level);
 }
 
-// The number of workers that no other DAG can keep from this one: as many as it can use, or all, or 0.
-std::uint32_t own_workers(const TaskSet &task_set, std::size_t dag) {
-  std::uint32_t last_tier = 0;
-  for (const std::uint32_t t : task_set.dags[dag].tasks) last_tier = std::max(last_tier, task_set.tasks[t].tier);
-  std::uint64_t others = 0;
-  Effort::spend(task_set.dags.size());
-  for (std::size_t d = 0; d < task_set.dags.size(); ++d) {
-    const CompiledDag &other = task_set.dags[d];
-    const bool interferes =
-        !preempts_at_once(task_set) || std::any_of(other.tasks.begin(), other.tasks.end(),
-                                                   [&](auto t) { return task_set.tasks[t].tier <= last_tier; });
-    if (d != dag && interferes) others += most_started(other);
+// How many jobs of all DAGs that can take a worker from one of a tier can be started.
+class Interference {
+ public:
+  explicit Interference(const TaskSet &task_set) {
+    const bool is_ordered = preempts_at_once(task_set);
+    for (const CompiledDag &dag : task_set.dags) {
+      if (dag.tasks.empty()) continue;
+      std::uint32_t first_tier = task_set.tasks[dag.tasks.front()].tier;
+      for (const std::uint32_t t : dag.tasks) first_tier = std::min(first_tier, task_set.tasks[t].tier);
+      // Unless urgent jobs preempt at once, every DAG can keep a worker from every other one.
+      started_[is_ordered ? first_tier : 0] += most_started(dag);
+    }
+    std::uint64_t sum = 0;
+    for (auto &[tier, started] : started_) started = sum += started;
   }
-  const std::uint32_t wanted = most_started(task_set.dags[dag]);
+
+  [[nodiscard]] std::uint64_t down_to(std::uint32_t tier) const {
+    const auto next = started_.upper_bound(tier);
+    return next == started_.begin() ? 0 : std::prev(next)->second;
+  }
+
+ private:
+  std::map<std::uint32_t, std::uint64_t> started_;  // by the first tier of DAGs: theirs, and all of earlier tiers
+};
+
+// The number of workers that no other DAG can keep from this one: as many as it can use, or all, or 0.
+std::uint32_t own_workers(const TaskSet &task_set, const CompiledDag &dag, const Interference &interference) {
+  std::uint32_t last_tier = 0;
+  for (const std::uint32_t t : dag.tasks) last_tier = std::max(last_tier, task_set.tasks[t].tier);
+  const std::uint32_t wanted = most_started(dag);
+  const std::uint64_t all = interference.down_to(last_tier);  // it is among them
   const std::uint32_t workers = task_set.platform.workers;
-  if (others + wanted <= workers) return wanted;
+  if (all <= workers) return wanted;
   // With fewer workers than its own bound it would compete with others for them; a DAG without others does not.
-  const bool alone =
-      others == 0 && task_set.dags[dag].units.size() == 1 && task_set.mode != sched::Preemption::Cooperative;
+  const bool alone = all == wanted && dag.units.size() == 1 && task_set.mode != sched::Preemption::Cooperative;
   return alone ? workers : 0;
 }
 
@@ -104,9 +120,9 @@ Outcome apply_isolated(const TaskSet &task_set) {
   if (!task_set.groups.empty()) return NotApplicable{"with exclusive groups, a worker can be idle while a job waits"};
   std::vector<ResponseBound> responses(task_set.units.size());
   bool any = false;
-  for (std::size_t d = 0; d < task_set.dags.size(); ++d) {
-    const CompiledDag &dag = task_set.dags[d];
-    const std::uint32_t workers = own_workers(task_set, d);
+  const Interference interference(task_set);
+  for (const CompiledDag &dag : task_set.dags) {
+    const std::uint32_t workers = own_workers(task_set, dag, interference);
     any = any || workers > 0;
     for (const std::uint32_t u : dag.units) {
       const Unit &unit = task_set.units[u];
@@ -162,7 +178,7 @@ Method isolated() {
       .assumptions =
           "the max_active of the DAG and of all that can take a worker from it sum up to at most m; any policy and "
           "mode; one rate per DAG with edges, R <= T; no shared groups",
-      .complexity = "O(DAGs tasks + workers (tasks + edges))",
+      .complexity = "O(tasks log DAGs + workers (tasks + edges))",
       .apply = apply_isolated,
   };
 }

@@ -6,6 +6,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "tests/testing/bound_property.hpp"
 #include "tests/testing/builders.hpp"
@@ -108,6 +111,15 @@ TEST(DagIsolated, TheMostUrgentHasAllWorkersWhereItPreempts) {
   const TaskSet task_set = compiled(2, {fork_join("first"), fork_join("second", 110)}, sched::Preemption::Full);
   EXPECT_EQ(dag_response(isolated(), task_set, 0), 15 + 8);
   EXPECT_FALSE(dag_response(isolated(), task_set, 1));
+}
+
+// It once compared each DAG with all tasks of all others: this would take hours.
+TEST(DagIsolated, TwentyThousandDags) {
+  std::vector<Dag> dags;
+  for (int d = 0; d < 20'000; ++d) dags.push_back(testing::tick_dag("d" + std::to_string(d), {{"t", 1000 + d, 1}}));
+  const TaskSet task_set = compiled(4, std::move(dags), sched::Preemption::Full);
+  EXPECT_EQ(dag_response(isolated(), task_set, 3), 1);
+  EXPECT_FALSE(dag_response(isolated(), task_set, 4));
 }
 
 }  // namespace
