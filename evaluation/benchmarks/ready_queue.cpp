@@ -6,7 +6,11 @@
 // std::priority_queue and tbb::concurrent_priority_queue. moodycamel and boost::lockfree do not order and do less; they
 // are a reference. Our queue needs no lock within one thread. The runtime holds it under a PiMutex.
 #include <benchmark/benchmark.h>
-#include <concurrentqueue/concurrentqueue.h>
+#if __has_include(<concurrentqueue/moodycamel/concurrentqueue.h>)
+#include <concurrentqueue/moodycamel/concurrentqueue.h>
+#else
+#include <concurrentqueue/concurrentqueue.h>  // Debian 12
+#endif
 #include <oneapi/tbb/concurrent_priority_queue.h>
 
 #include <array>
