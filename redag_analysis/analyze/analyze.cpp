@@ -56,12 +56,9 @@ MethodReport run(const TaskSet &task_set, const Method &method, const Effort::Li
 // Bounds more of the most urgent tasks, as if they were alone.
 void bound_alone(const TaskSet &task_set, const std::vector<Method> &methods, const Effort::Limits &limits,
                  Report &report) {
+  if (std::all_of(report.tasks.begin(), report.tasks.end(), [](const Tightest &task) { return task.response; })) return;
   const auto lacks_bound = [&](std::uint32_t t) { return !report.tasks[t].response; };
-  std::vector<MostUrgent> parts;
-  for (std::uint32_t t = 0; t < task_set.tasks.size() && parts.empty(); ++t) {
-    if (lacks_bound(t)) parts = most_urgent(task_set);
-  }
-  for (; !parts.empty(); parts.pop_back()) {
+  for (std::vector<MostUrgent> parts = most_urgent(task_set); !parts.empty(); parts.pop_back()) {
     if (std::none_of(parts.back().tasks.begin(), parts.back().tasks.end(), lacks_bound)) break;
     const auto part = std::make_shared<const MostUrgent>(std::move(parts.back()));
     for (const Method &method : methods) {
