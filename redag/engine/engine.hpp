@@ -130,6 +130,15 @@ struct AddedDag {
   std::vector<TaskId> tasks;  // in the DAG's order; consecutive unless ids are reused
 };
 
+/// A task to be added on its own: sched::Scheduler::add_task().
+struct NewTask {
+  DagId dag;
+  std::uint32_t rank = 0;
+  Task task;
+  Body body;
+  std::shared_ptr<SkipListener> listener = nullptr;  // if it is not null, the body should own it, too
+};
+
 class Engine {
  public:
   Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions options);
@@ -191,9 +200,8 @@ class Engine {
   AddedDag add_dag(const Dag &dag, std::vector<Body> bodies);
   /// Skips jobs that have not started. A body is destroyed as soon as its last job has ended.
   void remove_dag(DagId dag);
-  /// `listener` can be null; otherwise the body should own it, too.
-  TaskId add_task(DagId dag, std::uint32_t rank, const Task &task, Body body,
-                  std::shared_ptr<SkipListener> listener = nullptr);
+  /// One after the other, but in one decision.
+  std::vector<TaskId> add_tasks(std::vector<NewTask> tasks);
   /// As remove_dag(), and cancels the waits of the task's jobs. With reuse_ids, the caller must not use the id from
   /// here on.
   void remove_task(TaskId task);

@@ -52,21 +52,25 @@ AddedDag Engine::add_dag(const Dag &dag, std::vector<Body> bodies) {
   return added;
 }
 
-TaskId Engine::add_task(DagId dag, std::uint32_t rank, const Task &task, Body body,
-                        std::shared_ptr<SkipListener> listener) {
+std::vector<TaskId> Engine::add_tasks(std::vector<NewTask> tasks) {
+  std::vector<TaskId> ids;
+  ids.reserve(tasks.size());
   const Time at = now();
   Locked locked(*this);
   withdraw_if_halting(locked);
-  const TaskId id = scheduler_->add_task(dag, rank, task, at);
-  // Its jobs can carry older data. Only the caller knows what follows the task.
-  const TaskRole role{.dag = dag,
-                      .is_sink = true,
-                      .has_predecessors = true,
-                      .dag_deadline = dag.value < dag_deadlines_.size() ? dag_deadlines_[dag.value] : 0};
-  register_task(id, task, role, body, std::move(listener));
+  for (NewTask &one : tasks) {
+    const bool more = &one != &tasks.back();
+    ids.push_back(scheduler_->add_task(one.dag, one.rank, one.task, at, more));
+    // Its jobs can carry older data. Only the caller knows what follows the task.
+    const TaskRole role{.dag = one.dag,
+                        .is_sink = true,
+                        .has_predecessors = true,
+                        .dag_deadline = one.dag.value < dag_deadlines_.size() ? dag_deadlines_[one.dag.value] : 0};
+    register_task(ids.back(), one.task, role, one.body, std::move(one.listener));
+  }
   order_.tasks_changed();
   decide(locked, at);
-  return id;
+  return ids;
 }
 
 void Engine::remove_dag(DagId dag) {

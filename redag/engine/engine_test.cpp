@@ -296,7 +296,7 @@ TEST_P(EngineInEveryMode, ToTellOfASkipDoesNotAllocate) {
     }
     return Outcome::Finished;
   };
-  const TaskId id = bench.engine->add_task(DagId(0), 1, task, body, listener);
+  const TaskId id = bench.engine->add_tasks({{DagId(0), 1, task, body, listener}}).front();
   bench.engine->release(id, bench.engine->now());
   done.wait();
   bench.engine->join();
@@ -311,8 +311,8 @@ TEST_P(EngineInEveryMode, EverySkipIsTold) {
   const auto listener = std::make_shared<CountsSkips>();
   Task task = ladder(1).dags[0].tasks[0];
   task.name = "skipped";
-  const TaskId id = bench.engine->add_task(
-      DagId(0), 1, task, [](const Job &) { return Outcome::Finished; }, listener);
+  const TaskId id =
+      bench.engine->add_tasks({{DagId(0), 1, task, [](const Job &) { return Outcome::Finished; }, listener}}).front();
   constexpr std::uint32_t kReleases = 50;
   const std::vector<Release> releases(kReleases, Release{id, 0});
   const std::uint64_t before = testing::allocation_count();
@@ -409,12 +409,15 @@ TEST_P(EngineInEveryMode, TasksComeAndGoWhileItRuns) {
   task.concurrency = 2;
   task.overrun = Overrun::Queue;
   task.queue_depth = 3;
-  const TaskId steady = engine.add_task(dag, 0, task, [&](const Job &) {
-    most = std::max(most.load(), ++in_progress);
-    preemption_point();
-    --in_progress;
-    return Outcome::Finished;
-  });
+  const TaskId steady = engine
+                            .add_tasks({{dag, 0, task,
+                                         [&](const Job &) {
+                                           most = std::max(most.load(), ++in_progress);
+                                           preemption_point();
+                                           --in_progress;
+                                           return Outcome::Finished;
+                                         }}})
+                            .front();
   ASSERT_TRUE(engine.start());
   engine.set_origin(monotonic_now());
   engine.resume();
@@ -438,10 +441,13 @@ TEST_P(EngineInEveryMode, TasksComeAndGoWhileItRuns) {
     Task other = task;
     other.concurrency = 1;
     other.period = kMillisecond * (1 + i % 7);
-    const TaskId id = engine.add_task(dag, 1, other, [alive = std::move(alive)](const Job &) {
-      ++*alive;
-      return Outcome::Finished;
-    });
+    const TaskId id = engine
+                          .add_tasks({{dag, 1, other,
+                                       [alive = std::move(alive)](const Job &) {
+                                         ++*alive;
+                                         return Outcome::Finished;
+                                       }}})
+                          .front();
     engine.release(id, engine.now());
     engine.set_timing(id, kSecond, kSecond);
     engine.release(id, engine.now());
@@ -571,7 +577,7 @@ TEST(Engine, AListenerIsToldOfSkippedJobsAndNotOfMissedReleases) {
     use_processor(kMillisecond, false);
     return Outcome::Finished;
   };
-  const TaskId added = bench.engine->add_task(DagId(0), 1, task, body, log);
+  const TaskId added = bench.engine->add_tasks({{DagId(0), 1, task, body, log}}).front();
   bench.engine->release(added, 1);
   EXPECT_TRUE(log->reasons.empty());
   bench.engine->release(added, 2);

@@ -84,7 +84,8 @@ class Lifecycle final : public Scheduler {
   [[nodiscard]] bool high_mode() const override { return table_.high_mode; }
   DagId add_dag(const Dag &dag, Time now) override;
   void remove_dag(DagId dag, Time now) override;
-  TaskId add_task(DagId dag, std::uint32_t rank, const Task &task, Time now) override;
+  using Scheduler::add_task;
+  TaskId add_task(DagId dag, std::uint32_t rank, const Task &task, Time now, bool more) override;
   void set_predecessors(TaskId task, std::span<const TaskId> predecessors, Time now) override;
   void remove_task(TaskId task, Time now) override;
   void set_timing(TaskId task, Duration period, Duration deadline, Time now) override;

@@ -343,14 +343,14 @@ DagId Lifecycle<D>::add_dag(const Dag &dag, Time now) {
 }
 
 template <Dispatcher D>
-TaskId Lifecycle<D>::add_task(DagId dag, std::uint32_t rank, const Task &task, Time now) {
+TaskId Lifecycle<D>::add_task(DagId dag, std::uint32_t rank, const Task &task, Time now, bool more) {
   REDAG_CHECK(dag.value < table_.dags.size() && !table_.dags[dag.value].removed,
               "a task for a DAG that does not exist");
   REDAG_CHECK(task.predecessors.empty(), "a task that is added alone has no predecessors");
   table_.step.begin(now);
   table_.collect();
   const TaskId id = table_.append_task(dag, rank, task);
-  reprioritise();
+  if (!more) reprioritise();
   return id;
 }
 

@@ -160,8 +160,12 @@ class Scheduler {
   /// Removes a DAG: skips jobs that have not started. Started jobs end as usual.
   virtual void remove_dag(DagId dag, Time now) = 0;
   /// Adds a task without predecessors to a DAG. A timer task is released from outside, a data task by its messages.
-  /// `rank` is its topological rank in the DAG: ties of the policy are broken by DAG, rank and TaskId.
-  virtual TaskId add_task(DagId dag, std::uint32_t rank, const Task &task, Time now) = 0;
+  /// `rank` is its topological rank in the DAG: ties of the policy are broken by DAG, rank and TaskId. `more`: the next
+  /// call adds another one. Priorities are assigned with the last one, since that takes time for all tasks.
+  virtual TaskId add_task(DagId dag, std::uint32_t rank, const Task &task, Time now, bool more) = 0;
+  TaskId add_task(DagId dag, std::uint32_t rank, const Task &task, Time now) {
+    return add_task(dag, rank, task, now, false);
+  }
   /// Replaces the predecessors of a task that add_task() added by others of its DAG. No edge of it is aligned.
   virtual void set_predecessors(TaskId task, std::span<const TaskId> predecessors, Time now);
   /// As remove_dag(), for one task. Its successors get no more data from it.

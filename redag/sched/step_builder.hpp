@@ -23,6 +23,7 @@ class StepEntries {
  public:
   void reserve(std::size_t count) {
     if (count <= capacity_) return;
+    count = std::max(count, capacity_ + capacity_ / 2);  // tasks are added one by one
     auto room = std::make_unique<T[]>(count);
     std::copy_n(room_.get(), count_, room.get());
     room_ = std::move(room);

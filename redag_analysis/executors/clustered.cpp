@@ -128,7 +128,8 @@ bool ClusteredScheduler::outranked(JobSlot job) const { return of(job).outranked
 
 DagId ClusteredScheduler::add_dag(const Dag & /*dag*/, Time /*now*/) { refuse_change(); }
 void ClusteredScheduler::remove_dag(DagId /*dag*/, Time /*now*/) { refuse_change(); }
-TaskId ClusteredScheduler::add_task(DagId /*dag*/, std::uint32_t /*rank*/, const Task & /*task*/, Time /*now*/) {
+TaskId ClusteredScheduler::add_task(DagId /*dag*/, std::uint32_t /*rank*/, const Task & /*task*/, Time /*now*/,
+                                    bool /*more*/) {
   refuse_change();
 }
 void ClusteredScheduler::remove_task(TaskId /*task*/, Time /*now*/) { refuse_change(); }

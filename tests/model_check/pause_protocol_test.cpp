@@ -169,17 +169,20 @@ TEST(TaskProtocol, ATaskThatIsRemovedEndsItsJobsAndThenItsBody) {
         const auto add = [&] {
           std::shared_ptr<Record> alive(&records.emplace_back(), [](Record *it) { it->destroyed = true; });
           bodies.emplace_back(alive);
-          return engine.add_task(dag, 0, task, [&ran, alive = std::move(alive)](const Job &) {
-            // Reads the captures first: they no longer exist if the body is destroyed while it runs.
-            Record &record = *alive;
-            int &count = ran;
-            explored::write(record.object, "body begins");
-            preemption_point();
-            explored::write(record.object, "body ends");
-            explored::check(!record.destroyed, "a body was destroyed while it ran");
-            ++count;
-            return Outcome::Finished;
-          });
+          return engine
+              .add_tasks({{dag, 0, task,
+                           [&ran, alive = std::move(alive)](const Job &) {
+                             // Reads the captures first: they no longer exist if the body is destroyed while it runs.
+                             Record &record = *alive;
+                             int &count = ran;
+                             explored::write(record.object, "body begins");
+                             preemption_point();
+                             explored::write(record.object, "body ends");
+                             explored::check(!record.destroyed, "a body was destroyed while it ran");
+                             ++count;
+                             return Outcome::Finished;
+                           }}})
+              .front();
         };
         const TaskId steady = add();
         const std::uint32_t source = spawn([&] { engine.release(steady, 0); });

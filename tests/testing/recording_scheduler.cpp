@@ -125,11 +125,11 @@ void RecordingScheduler::remove_dag(DagId dag, Time now) {
   scheduler_->remove_dag(dag, now);
 }
 
-TaskId RecordingScheduler::add_task(DagId dag, std::uint32_t rank, const Task &task, Time now) {
+TaskId RecordingScheduler::add_task(DagId dag, std::uint32_t rank, const Task &task, Time now, bool more) {
   log_->calls.push_back(
       {.kind = Call::Kind::AddTask, .now = now, .dag = dag, .number = rank, .what = log_->tasks.size()});
   log_->tasks.push_back(task);
-  return scheduler_->add_task(dag, rank, task, now);
+  return scheduler_->add_task(dag, rank, task, now, more);
 }
 
 void RecordingScheduler::remove_task(TaskId task, Time now) {

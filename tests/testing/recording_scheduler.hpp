@@ -59,7 +59,8 @@ class RecordingScheduler final : public sched::Scheduler {
   [[nodiscard]] bool outranked(JobSlot job) const override { return scheduler_->outranked(job); }
   DagId add_dag(const Dag &dag, Time now) override;
   void remove_dag(DagId dag, Time now) override;
-  TaskId add_task(DagId dag, std::uint32_t rank, const Task &task, Time now) override;
+  using Scheduler::add_task;
+  TaskId add_task(DagId dag, std::uint32_t rank, const Task &task, Time now, bool more) override;
   void remove_task(TaskId task, Time now) override;
   void set_timing(TaskId task, Duration period, Duration deadline, Time now) override;
   void close(Time now) override;

@@ -712,7 +712,7 @@ DagId ReferenceScheduler::add_dag(const Dag &dag, Time /*now*/) {
   return DagId(dags_.size() - 1);
 }
 
-TaskId ReferenceScheduler::add_task(DagId dag, std::uint32_t rank, const Task &task, Time /*now*/) {
+TaskId ReferenceScheduler::add_task(DagId dag, std::uint32_t rank, const Task &task, Time /*now*/, bool /*more*/) {
   forget_what_is_gone();
   TaskState state;
   state.task = task;

@@ -35,7 +35,8 @@ class ReferenceScheduler final : public sched::Scheduler {
   [[nodiscard]] bool outranked(JobSlot job) const override;
   DagId add_dag(const Dag &dag, Time now) override;
   void remove_dag(DagId dag, Time now) override;
-  TaskId add_task(DagId dag, std::uint32_t rank, const Task &task, Time now) override;
+  using Scheduler::add_task;
+  TaskId add_task(DagId dag, std::uint32_t rank, const Task &task, Time now, bool more) override;
   void remove_task(TaskId task, Time now) override;
   void set_timing(TaskId task, Duration period, Duration deadline, Time now) override;
   void close(Time now) override;

@@ -278,7 +278,7 @@ class Run {
     expected_->remove_dag(dag, now_);
   }
 
-  // Adds a task to one of the remaining DAGs, anywhere in its order.
+  // Adds a task, or two as one change, to one of the remaining DAGs, anywhere in its order.
   std::optional<std::string> add_task(std::uint8_t choice) {
     std::vector<std::size_t> left;
     for (std::size_t d = 0; d < dags_.size(); ++d) {
@@ -286,13 +286,15 @@ class Run {
     }
     if (left.empty()) return std::nullopt;
     Rng rng(choice);
-    Task task = random_dag(rng, {1, 1, true, true, false}).tasks.front();
-    task.offset += now_ / task.period * task.period;
-    const auto rank = static_cast<std::uint32_t>(rng.uniform(0, 4));
     const std::size_t dag = left[choice % left.size()];
-    const TaskId id = tested_->add_task(DagId(dag), rank, task, now_);
-    if (id != expected_->add_task(DagId(dag), rank, task, now_)) return "  a task has another id";
-    know(dags_[dag], task);
+    for (std::int64_t others = rng.uniform(0, 1); others >= 0; --others) {
+      Task task = random_dag(rng, {1, 1, true, true, false}).tasks.front();
+      task.offset += now_ / task.period * task.period;
+      const auto rank = static_cast<std::uint32_t>(rng.uniform(0, 4));
+      const TaskId id = tested_->add_task(DagId(dag), rank, task, now_, others > 0);
+      if (id != expected_->add_task(DagId(dag), rank, task, now_)) return "  a task has another id";
+      know(dags_[dag], task);
+    }
     const auto actual = tested_->tasks_of(DagId(dag));
     const auto wanted = expected_->tasks_of(DagId(dag));
     if (!std::equal(actual.begin(), actual.end(), wanted.begin(), wanted.end())) return "  a DAG has other tasks";

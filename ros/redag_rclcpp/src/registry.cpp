@@ -141,19 +141,23 @@ void Registry::collect() {
   }
   for (const auto &callback : gone) remove(callback);
   find_places(found);
-  std::vector<std::shared_ptr<WaitSetMember>> added;
-  const auto add_one = [&](const Entity &entity, redag::CallbackId id) REDAG_REQUIRES(collect_lock_) {
-    add(entity, std::move(id));
-    added.push_back(callbacks_.at(entity.key));
-  };
+  Added added;
+  std::vector<Found> absent;
   for (const Entity &entity : found) {
-    if (callbacks_.count(entity.key) != 0 || is_called_by_owner(entity)) continue;
-    add_one(entity, id_of(entity, next_index_));
+    if (callbacks_.count(entity.key) != 0 || entity.owner != nullptr) continue;
+    absent.push_back({&entity, id_of(entity, next_index_)});
   }
+  add(std::exchange(absent, {}), added);
+  // Only now is it known which waitables call their timers themselves.
+  for (const Entity &entity : found) {
+    if (callbacks_.count(entity.key) != 0 || entity.owner == nullptr || is_called_by_owner(entity)) continue;
+    absent.push_back({&entity, id_of(entity, next_index_)});
+  }
+  add(std::exchange(absent, {}), added);
   for (const std::shared_ptr<Callback> &callback : still_plain()) {
-    const Entity &entity = *present.at(remove(callback));
-    add_one(entity, callback->id());
+    absent.push_back({present.at(remove(callback)), callback->id()});
   }
+  add(std::move(absent), added);
   connect();
   if (!added.empty() && rclcpp::ok(context_)) find_leftovers(context_, added);
 }
@@ -245,28 +249,37 @@ redag::CallbackId Registry::id_of(const Entity &found, Counters &counters) const
   return id;
 }
 
-void Registry::add(const Entity &found, redag::CallbackId id) {
-  TaskTable::Entry entry;
-  entry.id = std::move(id);
-  entry.in_default_group = found.in_default_group;
-  place(entry, found);
-  const Place its_place{entry.dag, entry.position};
+// Together, since a change of the tasks costs the engine time for each that it has.
+void Registry::add(std::vector<Found> found, Added &added) {
+  if (found.empty()) return;
+  std::vector<TaskTable::Entry> entries;
+  std::vector<redag::runtime::NewTask> tasks;
+  for (Found &one : found) {
+    TaskTable::Entry &entry = entries.emplace_back();
+    entry.id = std::move(one.id);
+    entry.in_default_group = one.entity->in_default_group;
+    place(entry, *one.entity);
+    const Place its_place{entry.dag, entry.position};
 
-  const std::shared_ptr<Callback> callback = found.make(executor_.lock(), entry.id);
-  entry.callback = callback;
-  callback->set_deadline(entry.task.deadline);
-  // A timer waits for predecessors that come later, too. Other callbacks are then added anew: see still_plain().
-  const bool is_timer = entry.id.kind == redag::Callback::Kind::Timer;
-  const bool waits = entry.configured && callback->can_join() && (is_timer || has_predecessor(its_place));
-  if (waits) entry.task.activation = callback->join();
-  if (entry.configured) placed_.emplace(its_place, Placed{callback, waits});
-
-  const redag::TaskId task = parts_.engine.add_task(
-      dag_ids_[entry.dag], entry.rank, entry.task,
-      [callback](const redag::runtime::Job &job) { return callback->execute(job); }, callback);
-  parts_.tasks.set(task, std::move(entry));
-  callbacks_[found.key] = callback;
-  if (callback->attach(task)) parts_.bridge.add(callback);
+    const std::shared_ptr<Callback> callback = one.entity->make(executor_.lock(), entry.id);
+    entry.callback = callback;
+    callback->set_deadline(entry.task.deadline);
+    // A timer waits for predecessors that come later, too. Other callbacks are then added anew: see still_plain().
+    const bool is_timer = entry.id.kind == redag::Callback::Kind::Timer;
+    const bool waits = entry.configured && callback->can_join() && (is_timer || has_predecessor(its_place));
+    if (waits) entry.task.activation = callback->join();
+    if (entry.configured) placed_.emplace(its_place, Placed{callback, waits});
+    tasks.push_back({dag_ids_[entry.dag], entry.rank, entry.task,
+                     [callback](const redag::runtime::Job &job) { return callback->execute(job); }, callback});
+  }
+  const std::vector<redag::TaskId> ids = parts_.engine.add_tasks(std::move(tasks));
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const std::shared_ptr<Callback> callback = entries[i].callback;
+    parts_.tasks.set(ids[i], std::move(entries[i]));
+    callbacks_[found[i].entity->key] = callback;
+    added.push_back(callback);
+    if (callback->attach(ids[i])) parts_.bridge.add(callback);
+  }
 }
 
 // Decides which task of which DAG the callback is, and with which parameters.

@@ -92,7 +92,13 @@ class Registry {
   };
 
   [[nodiscard]] redag::CallbackId id_of(const Entity &found, Counters &counters) const;
-  void add(const Entity &found, redag::CallbackId id) REDAG_REQUIRES(collect_lock_);
+  /// An entity that gets a callback.
+  struct Found {
+    const Entity *entity;
+    redag::CallbackId id;
+  };
+  using Added = std::vector<std::shared_ptr<WaitSetMember>>;
+  void add(std::vector<Found> found, Added &added) REDAG_REQUIRES(collect_lock_);
   void find_places(const std::vector<Entity> &found) REDAG_REQUIRES(collect_lock_);
   [[nodiscard]] const redag::Task &task_at(Place place) const;
   [[nodiscard]] std::string name_at(Place place) const;
