@@ -223,6 +223,32 @@ TEST(Diagnoser, MissesAreNewOnce) {
   EXPECT_EQ(level_with(7), DiagnosticStatus::OK) << "nobody stated that deadline";
 }
 
+// A message for thousands of callbacks would have megabytes.
+TEST(Diagnoser, MessagesShowTheWorstCallbacks) {
+  std::vector<TaskFigures> tasks(5);
+  for (std::size_t i = 0; i < tasks.size(); ++i) {
+    tasks[i].stats = stats_of("control.t" + std::to_string(i), 10 * kMillisecond);
+    tasks[i].has_deadline = true;
+  }
+  tasks[3].stats.misses = 2;
+  tasks[4].stats.misses = 1;
+  Snapshot snapshot = snapshot_of(tasks);
+  EXPECT_THAT(to_json(snapshot), HasSubstr(R"("left_out":0)"));
+  show_most(snapshot, 2);
+  EXPECT_THAT(to_json(snapshot), HasSubstr(R"("left_out":3)"));
+  Diagnoser diagnoser;
+  const auto statuses = diagnoser.diagnose(snapshot);
+  const DiagnosticStatus &status = *find_status(statuses, "ReDAG: DAG control");
+  EXPECT_EQ(value_of(status, "t3 misses"), "2");
+  EXPECT_EQ(value_of(status, "t4 misses"), "1");
+  EXPECT_EQ(value_of(status, "t0 misses"), "(none)");
+  // One that was not shown before has no new misses.
+  snapshot.tasks[0].stats.misses = 5;
+  snapshot.tasks[0].is_shown = true;
+  EXPECT_THAT(find_status(diagnoser.diagnose(snapshot), "ReDAG: DAG control")->message, HasSubstr("missed 5 more"));
+  EXPECT_EQ(find_status(diagnoser.diagnose(snapshot), "ReDAG: DAG control")->message, "no new misses");
+}
+
 TEST(Diagnoser, DeadlocksAreErrorsWhileTheyLast) {
   Snapshot snapshot = snapshot_of({});
   Diagnoser diagnoser;

@@ -37,6 +37,7 @@ using std_srvs::srv::Trigger;
 namespace {
 
 constexpr auto kDrainPeriod = std::chrono::milliseconds(50);
+constexpr std::size_t kMostPublished = 200;  // callbacks, of a few hundred bytes each; on request there are all
 constexpr auto kLookPeriod = std::chrono::milliseconds(500);  // between looks at the callbacks behind the bounds
 
 /// Schedule of a repeated action.
@@ -233,7 +234,8 @@ void Monitor::Impl::main() {
 
 // Publishes on the monitor's own thread: a callback for this would have to wait for an overloaded executor.
 void Monitor::Impl::publish() {
-  const Snapshot now = snapshot();
+  Snapshot now = snapshot();
+  show_most(now, kMostPublished);
   DiagnosticArray array;
   array.header.stamp = node_->now();
   array.status = diagnoser_.diagnose(now);

@@ -157,11 +157,30 @@ std::vector<std::string> broken_promises(const Snapshot &snapshot) {
   return broken;
 }
 
+void add_figures(DiagnosticStatus &status, const std::string &name, const TaskFigures &task) {
+  const CallbackStats &stats = task.stats;
+  const auto value = [&](const char *key, std::string text) {
+    status.values.push_back(pair(name + " " + key, std::move(text)));
+  };
+  value("period", format_duration(stats.period));
+  value("deadline", format_duration(stats.deadline) + (task.has_deadline ? "" : " (assumed)"));
+  value("released", std::to_string(stats.jobs.released));
+  value("misses", std::to_string(stats.misses));
+  value("response p50", humanize_duration(stats.response_p50));
+  value("response p99", humanize_duration(stats.response_p99));
+  value("response max", humanize_duration(stats.response_max));
+  value("execution max", humanize_duration(stats.execution_max));
+  if (stats.wcet > 0) value("wcet", format_duration(stats.wcet));
+  if (task.bound) value("bound", format_duration(task.bound->response));
+}
+
 }  // namespace
 
 std::string to_json(const Snapshot &snapshot) {
   Json tasks = Json::array();
-  for (const TaskFigures &task : snapshot.tasks) tasks.push_back(task_json(task));
+  for (const TaskFigures &task : snapshot.tasks) {
+    if (task.is_shown) tasks.push_back(task_json(task));
+  }
   Json deadlocks = Json::array();
   for (const Deadlock &deadlock : snapshot.deadlocks) deadlocks.push_back(deadlock_json(deadlock));
   const Json json{{"format", "redag.metrics/1"},
@@ -174,9 +193,21 @@ std::string to_json(const Snapshot &snapshot) {
                   {"warnings", snapshot.warnings},
                   {"deadlocks", deadlocks},
                   {"bounds_absent", snapshot.has_bounds ? Json(snapshot.bounds_absent) : Json("not asked for")},
-                  {"tasks", tasks}};
+                  {"tasks", tasks},
+                  {"left_out", snapshot.tasks.size() - tasks.size()}};
   // Names from outside may not be UTF-8. A replaced character is better than no snapshot.
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+void show_most(Snapshot &snapshot, std::size_t most) {
+  std::vector<TaskFigures *> tasks;
+  for (TaskFigures &task : snapshot.tasks) tasks.push_back(&task);
+  const auto troubles = [](const TaskFigures *task) {
+    return task->stats.misses + (task->bound ? task->bound->exceeded : 0);
+  };
+  // Of equals the most urgent one, which stands first.
+  std::stable_sort(tasks.begin(), tasks.end(), [&](auto *a, auto *b) { return troubles(a) > troubles(b); });
+  for (std::size_t i = most; i < tasks.size(); ++i) tasks[i]->is_shown = false;
 }
 
 std::vector<std::string> closing_lines(const Snapshot &snapshot) {
@@ -268,20 +299,7 @@ std::vector<DiagnosticStatus> Diagnoser::diagnose(const Snapshot &snapshot) {
 void Diagnoser::add(DiagnosticStatus &status, const TaskFigures &task, const std::optional<redag::Overheads> &machine) {
   const CallbackStats &stats = task.stats;
   const std::string name = short_name(stats);
-  const auto value = [&](const char *key, std::string text) {
-    status.values.push_back(pair(name + " " + key, std::move(text)));
-  };
-  value("period", format_duration(stats.period));
-  value("deadline", format_duration(stats.deadline) + (task.has_deadline ? "" : " (assumed)"));
-  value("released", std::to_string(stats.jobs.released));
-  value("misses", std::to_string(stats.misses));
-  value("response p50", humanize_duration(stats.response_p50));
-  value("response p99", humanize_duration(stats.response_p99));
-  value("response max", humanize_duration(stats.response_max));
-  value("execution max", humanize_duration(stats.execution_max));
-  if (stats.wcet > 0) value("wcet", format_duration(stats.wcet));
-  if (task.bound) value("bound", format_duration(task.bound->response));
-
+  if (task.is_shown) add_figures(status, name, task);
   const auto last = misses_.find(stats.task + to_string(stats.id));
   const std::uint64_t before = last == misses_.end() ? 0 : last->second;
   const std::uint64_t missed = stats.misses > before ? stats.misses - before : 0;

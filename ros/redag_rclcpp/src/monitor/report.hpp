@@ -25,6 +25,7 @@ struct TaskFigures {
   std::optional<TaskBound> bound;
   /// True if the deadline is stated by the workload, a timer's period, or learned. Otherwise it is an assumption.
   bool has_deadline = false;
+  bool is_shown = true;  // with all its figures
 };
 
 struct Snapshot {
@@ -44,6 +45,9 @@ struct Snapshot {
 
 /// The snapshot as JSON, "redag.metrics/1" (docs/results_format.md), on one line.
 [[nodiscard]] std::string to_json(const Snapshot &snapshot);
+
+/// Shows no more than `most` callbacks: those with the most misses, then the most urgent ones.
+void show_most(Snapshot &snapshot, std::size_t most);
 
 /// Three lines for the end of a run: whether all was as promised; which rates are known; jobs, misses, and the callback
 /// with the most of them, with the likely cause and what helps.
