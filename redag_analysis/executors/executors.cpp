@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 #include "redag/base/check.hpp"
 #include "redag/sched/cluster_config.hpp"
@@ -46,7 +47,7 @@ sched::Config effective_config(const ExecutorKind &kind, sched::Config config) {
 }
 
 std::unique_ptr<sched::Scheduler> make_scheduler(std::string_view name, const Workload &workload,
-                                                 const sched::Config &config) {
+                                                 const sched::Config &config, std::vector<std::uint32_t> ranks) {
   const ExecutorKind *kind = find_executor(name);
   REDAG_CHECK(kind != nullptr, "there is no executor of this name");
   if (!workload.platform.clusters.empty()) {
@@ -61,8 +62,8 @@ std::unique_ptr<sched::Scheduler> make_scheduler(std::string_view name, const Wo
     return std::make_unique<EventsScheduler>(workload, effective, EventsDispatcher::Kind::CallbackGroups);
   }
   using Order = WaitSetDispatcher::Order;
-  return std::make_unique<WaitSetScheduler>(workload, effective,
-                                            name == "static" ? Order::SubscriptionsFirst : Order::TimersFirst);
+  return std::make_unique<WaitSetScheduler>(
+      workload, effective, name == "static" ? Order::SubscriptionsFirst : Order::TimersFirst, std::move(ranks));
 }
 
 }  // namespace redag::executors

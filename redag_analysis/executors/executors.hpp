@@ -4,9 +4,11 @@
 // The executors by name. Drivers and the program get their schedulers here.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "redag/sched/scheduler.hpp"
 
@@ -31,8 +33,9 @@ struct ExecutorKind {
 [[nodiscard]] sched::Config effective_config(const ExecutorKind &kind, sched::Config config);
 
 /// Creates a scheduler for effective_config(), with clusters one for each of them. Requires a known name and what
-/// PriorityScheduler requires.
+/// PriorityScheduler requires. `ranks`: see WaitSetDispatcher; not with clusters.
 [[nodiscard]] std::unique_ptr<sched::Scheduler> make_scheduler(std::string_view name, const Workload &workload,
-                                                               const sched::Config &config);
+                                                               const sched::Config &config,
+                                                               std::vector<std::uint32_t> ranks = {});
 
 }  // namespace redag::executors

@@ -3,14 +3,17 @@
 
 #include "redag_analysis/executors/wait_set.hpp"
 
+#include <algorithm>
+#include <utility>
+
 #include "redag/sched/lifecycle_rules.hpp"
 
 template class redag::sched::Lifecycle<redag::executors::WaitSetDispatcher>;
 
 namespace redag::executors {
 
-WaitSetDispatcher::WaitSetDispatcher(sched::JobTable &table, Order order)
-    : table_(table), threads_(table), order_(order) {}
+WaitSetDispatcher::WaitSetDispatcher(sched::JobTable &table, Order order, std::vector<std::uint32_t> ranks)
+    : table_(table), threads_(table), order_(order), ranks_(std::move(ranks)) {}
 
 void WaitSetDispatcher::decide(std::uint32_t most) {
   threads_.run(most, [this] { return take(); });
@@ -65,9 +68,13 @@ void WaitSetDispatcher::on_reconfigured() {
   entities_.resize(table_.tasks.size());
   registration_.clear();
   for (const bool first : {true, false}) {
+    const auto begin = static_cast<std::ptrdiff_t>(registration_.size());
     for (std::uint32_t t = 0; t < table_.tasks.size(); ++t) {
       if ((table_.tasks[t].timer == (order_ == Order::TimersFirst)) == first) registration_.push_back(t);
     }
+    if (ranks_.size() < table_.tasks.size()) continue;
+    std::stable_sort(registration_.begin() + begin, registration_.end(),
+                     [this](std::uint32_t a, std::uint32_t b) { return ranks_[a] < ranks_[b]; });
   }
   room_.assign(table_.tasks.size() + table_.group_slots(), 1);
   for (std::uint32_t t = 0; t < table_.tasks.size(); ++t) {

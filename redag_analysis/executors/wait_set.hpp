@@ -28,9 +28,9 @@ namespace redag::executors {
 /// - MultiThreadedExecutor::run: the threads take one entity each under a lock; a group is busy until its job ends.
 ///
 /// Not modelled: the cost of rcl_wait, of the lock and of waking a thread; services, clients and waitables. ROS 2 walks
-/// through groups in the arbitrary order of their addresses (here: the order of DAGs and tasks). The static executor
-/// takes messages within the process last, even if they came during the walk. Jazzy's static executor waits again after
-/// each callback; a ready subscription thus always goes before every timer.
+/// through groups in the arbitrary order of their addresses (here: `ranks`, or the order of DAGs and tasks). The static
+/// executor takes messages within the process last, even if they came during the walk. Jazzy's static executor waits
+/// again after each callback; a ready subscription thus always goes before every timer.
 ///
 /// A timer task is a timer, a data task a subscription. `group` is the callback group. A task without one is alone in a
 /// group of its own, whereas in ROS 2 all callbacks of a node share its default group unless the node says
@@ -42,8 +42,8 @@ class WaitSetDispatcher {
   enum class Order : std::uint8_t { TimersFirst, SubscriptionsFirst };
 
   /// Requires config.workers > 0 and Preemption::None. With 1 worker it is the SingleThreadedExecutor or, with
-  /// subscriptions first, the static one.
-  WaitSetDispatcher(sched::JobTable &table, Order order);
+  /// subscriptions first, the static one. `ranks` of tasks, if there are any, replace the order of registration.
+  WaitSetDispatcher(sched::JobTable &table, Order order, std::vector<std::uint32_t> ranks = {});
 
   void on_ready(std::uint32_t slot);
   void on_withdrawn(std::uint32_t slot);
@@ -70,6 +70,7 @@ class WaitSetDispatcher {
   sched::JobTable &table_;
   CallbackThreads threads_;
   Order order_;
+  std::vector<std::uint32_t> ranks_;         // by TaskId
   std::vector<Entity> entities_;             // by TaskId
   std::vector<std::uint32_t> registration_;  // tasks in the order in which a window is searched
   std::vector<std::uint32_t> room_;          // number of jobs that a group can start: one group for each task, then the

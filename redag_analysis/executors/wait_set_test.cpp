@@ -53,6 +53,14 @@ TEST(SingleThreaded, TimersGoBeforeSubscriptionsAndBothInTheOrderOfRegistration)
   EXPECT_EQ(ste.end("second"), Names{});
 }
 
+TEST(SingleThreaded, RanksReplaceTheOrderOfRegistration) {
+  NamedExecutor ste{"ste", {{timer("a"), subscription("b", {0})}, {timer("c")}, {timer("d")}}, 1, {2, 0, 3, 1}};
+  EXPECT_EQ(ste.release_and_dispatch({"a", "c", "d"}), Names{"d"});
+  EXPECT_EQ(ste.end("d"), Names{"a"});
+  EXPECT_EQ(ste.end("a"), Names{"c"});
+  EXPECT_EQ(ste.end("c"), Names{"b"});  // subscriptions are last, as always
+}
+
 // The priority inversion of Casini et al.: even a timer waits for all subscriptions of the window.
 TEST(SingleThreaded, WhatBecomesReadyDuringAWindowIsSeenAfterIt) {
   NamedExecutor ste = single_threaded(

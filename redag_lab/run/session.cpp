@@ -194,7 +194,7 @@ Result<Session> simulate(const Workload &workload, const Variant &variant, Sessi
   simulator.overheads = options.overheads;
   simulator.demand = options.demand;
   simulator.gap = options.gap;
-  const auto scheduler = executors::make_scheduler(variant.executor, workload, info.config);
+  const auto scheduler = executors::make_scheduler(variant.executor, workload, info.config, options.ranks);
   const sim::Result result = sim::simulate(workload, *scheduler, info.config.workers, simulator, sink);
 
   session.stopped = result.end < options.duration;

@@ -38,6 +38,7 @@ struct SessionOptions : RunSettings {
   sim::Overheads overheads;     // simulator, like `demand` and `gap`
   decltype(sim::Options::demand) demand;
   decltype(sim::Options::gap) gap;
+  std::vector<std::uint32_t> ranks;        // of executors::make_scheduler()
   std::optional<Calibration> calibration;  // overheads of a machine: simulated; on threads, charged to bounds
   Duration watchdog = 0;                   // threads: reports jobs that run for longer to `on_overdue` at once; 0: off
 };

@@ -29,7 +29,8 @@ class NamedExecutor {
  public:
   using Names = std::vector<std::string>;
 
-  NamedExecutor(std::string_view executor, std::vector<std::vector<Task>> dags, std::uint32_t workers) {
+  NamedExecutor(std::string_view executor, std::vector<std::vector<Task>> dags, std::uint32_t workers,
+                std::vector<std::uint32_t> ranks = {}) {
     for (std::vector<Task> &tasks : dags) {
       Dag dag;
       dag.tasks = std::move(tasks);
@@ -40,7 +41,7 @@ class NamedExecutor {
     for (const TaskRef &ref : flatten(workload_)) names_.push_back(ref.task->name);
     sched::Config config;
     config.workers = workers;
-    scheduler_ = executors::make_scheduler(executor, workload_, config);
+    scheduler_ = executors::make_scheduler(executor, workload_, config, std::move(ranks));
   }
 
   void release(const std::string &name) {
