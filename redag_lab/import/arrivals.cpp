@@ -7,9 +7,11 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <span>
 
 #include "redag/base/check.hpp"
 #include "redag_lab/import/model.hpp"
+#include "redag_lab/import/units.hpp"
 
 namespace redag::lab {
 namespace {
@@ -67,6 +69,39 @@ Arrivals fit_grid(const std::vector<Time> &instants, Duration median) {
 }
 
 }  // namespace
+
+Duration most_early(Duration period) { return std::min(period / 10, kMillisecond); }
+
+Time last_expiry(Time grid, Duration period, Time start, Duration early) {
+  return std::min(start, start + early - ((start + early - grid) % period + period) % period);
+}
+
+Time grid_of(const CallbackRecord &timer) {
+  constexpr std::size_t kMostTried = 64;
+  constexpr Duration kWakeUp = 200 * kMicrosecond;
+  const Duration period = timer.id.period;
+  const auto runs = std::span(timer.ended).first(std::min(timer.ended.size(), kMostTried));
+  const auto seen = [](const EndedRun &run) { return run.woken.value_or(run.start); };
+  // How late runs were though the executor was free. Of a wrong grid they are late without a reason.
+  const auto lateness = [&](Time grid, Duration early) {
+    Duration sum = 0;
+    for (const EndedRun &run : runs) {
+      const Time expiry = last_expiry(grid, period, seen(run), early);
+      if (run.free) sum += seen(run) - (run.woken ? expiry : std::max(expiry, *run.free));
+    }
+    return sum;
+  };
+  if (runs.size() < kFewestRuns) return timer.created;
+  Time best = timer.created;
+  Duration least = lateness(best, most_early(period)) - kWakeUp * static_cast<Duration>(runs.size());
+  for (const EndedRun &run : runs) {
+    const Duration sum = lateness(seen(run), 0);
+    if (sum >= least) continue;
+    least = sum;
+    best = seen(run);
+  }
+  return best;
+}
 
 Arrivals estimate_arrivals(std::vector<Time> instants) {
   REDAG_CHECK(instants.size() >= 3, "a rate needs three arrivals");

@@ -33,6 +33,8 @@ struct RosEvent {
     Group,                 // handle: callback group; name: its type (CARET)
     GroupMember,           // handle: timer, subscription of rcl, or service; other: callback group (CARET)
     Executor,              // the thread is one of an executor
+    Look,                  // the same: it looks for work in what the last wait returned
+    Wait,                  // the same: it waits for entities to be ready
     Switch,                // of the kernel: thread `handle` leaves a processor, thread `other` gets it
   };
 
@@ -95,8 +97,8 @@ inline constexpr std::array kRosEventNames = {
                  "callback_group_addr"},
     RosEventName{"ros2_caret:callback_group_add_service", RosEvent::Kind::GroupMember, "service_handle",
                  "callback_group_addr"},
-    RosEventName{"ros2:rclcpp_executor_get_next_ready", RosEvent::Kind::Executor},
-    RosEventName{"ros2:rclcpp_executor_wait_for_work", RosEvent::Kind::Executor},
+    RosEventName{"ros2:rclcpp_executor_get_next_ready", RosEvent::Kind::Look},
+    RosEventName{"ros2:rclcpp_executor_wait_for_work", RosEvent::Kind::Wait},
     RosEventName{"ros2:rclcpp_executor_execute", RosEvent::Kind::Executor},
     RosEventName{"sched_switch", RosEvent::Kind::Switch, "prev_tid", "next_tid"},
 };

@@ -39,15 +39,14 @@ class Importing {
     Units found = find_units(recording, pid);
     find_edges(recording, found.units);
     units_ = std::move(found.units);
+    rank_units();
     result_.left_out = std::move(found.left_out);
     result_.messages = found.messages;
     result_.explained = found.explained;
   }
 
   ImportedWorkload run() {
-    result_.wake_ups = process_.wake_ups.distribution();
-    result_.overhead =
-        process_.turnarounds.size() >= kQuantiles ? process_.turnarounds.distribution().p50 : result_.wake_ups.min;
+    measure_delays();
     make_dags();
     describe();
     return std::move(result_);
@@ -57,6 +56,48 @@ class Importing {
   [[nodiscard]] const CallbackRecord &first_of(const Unit &unit) const { return callbacks_[unit.members.front()]; }
   [[nodiscard]] bool is_timer(std::size_t callback) const {
     return callbacks_[callback].id.kind == CallbackKind::Timer;
+  }
+
+  /// Ranks units in the order in which the executor took ready callbacks of a kind, as far as it was seen: rclcpp goes
+  /// by addresses or by registration, of which no event tells.
+  void rank_units() {
+    Positions unit_of(callbacks_.size(), SIZE_MAX);
+    for (std::size_t i = 0; i < units_.size(); ++i) {
+      for (const std::size_t member : units_[i].members) unit_of[member] = i;
+    }
+    std::vector<Positions> after(units_.size());
+    Positions before(units_.size(), 0);
+    std::map<std::pair<std::size_t, std::size_t>, std::uint64_t> turns;
+    for (const auto &[pair, count] : recording_.turns()) turns[{unit_of[pair.first], unit_of[pair.second]}] += count;
+    for (const auto &[pair, count] : turns) {
+      const auto [first, second] = pair;
+      const auto reverse = turns.find({second, first});
+      if (std::max(first, second) == SIZE_MAX || (reverse != turns.end() && reverse->second >= count)) continue;
+      after[first].push_back(second);
+      ++before[second];
+    }
+    std::set<std::pair<std::size_t, std::size_t>> left;  // units, with how many come before; the least is next
+    for (std::size_t i = 0; i < units_.size(); ++i) left.emplace(before[i], i);
+    for (std::uint32_t rank = 0; !left.empty(); ++rank) {
+      const std::size_t next = left.begin()->second;
+      left.erase(left.begin());
+      units_[next].rank = rank;
+      for (const std::size_t unit : after[next]) {
+        if (left.erase({before[unit], unit}) > 0) left.emplace(--before[unit], unit);
+      }
+    }
+  }
+
+  void measure_delays() {
+    metrics::DurationSketch wake_ups{1024};
+    metrics::DurationSketch turnarounds{1024};
+    for (const Unit &unit : units_) {
+      for (const EndedRun &run : unit.runs) {
+        if (run.delay()) (*run.free <= *run.released ? wake_ups : turnarounds).add(*run.delay());
+      }
+    }
+    result_.wake_ups = wake_ups.distribution();
+    result_.overhead = turnarounds.size() >= kQuantiles ? turnarounds.distribution().p50 : result_.wake_ups.min;
   }
 
   // ---- tasks ----
@@ -133,14 +174,30 @@ class Importing {
 
   [[nodiscard]] Replay replay_of(const Unit &unit, const Task &task) const {
     Replay replay;
-    replay.responses = unit.response.distribution();
+    replay.rank = unit.rank;
+    metrics::DurationSketch responses{1024};
+    if (unit.runs.empty()) return replay;
+    const Time first_release = unit.runs.front().released.value_or(unit.runs.front().start);
+    const Duration stated = first_of(unit).id.period;
+    const bool is_on_grid = unit.members.size() == 1 && stated > 0 && task.period == stated;
     for (const EndedRun &run : unit.runs) {
-      replay.demands.push_back(run.execution + run.delay.value_or(result_.overhead));
+      if (run.released) responses.add(run.end - *run.released);
+      // Releases of a timer that no run answered have a number, too.
+      const std::size_t number =
+          is_on_grid ? static_cast<std::size_t>((*run.released - first_release + task.period / 2) / task.period)
+                     : replay.executions.size();
+      const std::size_t count = std::clamp(number + 1, replay.executions.size(), kMostRuns);
+      replay.executions.resize(count, run.execution);
+      replay.delays.resize(count, run.delay().value_or(result_.overhead));
     }
+    replay.responses = responses.distribution();
+    std::vector<Duration> sorted = replay.executions;
+    std::sort(sorted.begin(), sorted.end());
+    const Duration upper = sorted[sorted.size() * 3 / 4];
+    replay.undisturbed = upper + (upper - sorted[sorted.size() / 4]) * 3 / 2;  // Tukey's fence for outliers
     if (task.activation == Activation::Data) return replay;
     const CallbackRecord &first = first_of(unit);
-    const Time begin = first.id.period > 0 ? first.created : first.begun.front();
-    replay.phase = ((begin - recording_.first()) % task.period + task.period) % task.period;
+    replay.offset = std::max<Time>(first_release - recording_.first(), 0);
     for (std::size_t i = 1; task.phase == Phase::Event && i < first.begun.size(); ++i) {
       replay.gaps.push_back(std::max<Duration>(first.begun[i] - first.begun[i - 1] - task.period, 0));
     }
@@ -240,6 +297,7 @@ class Importing {
     }
     result_.executed = process_.executed;
     result_.length = recording_.last() - recording_.first();
+    result_.is_wall_time = !process_.has_switches;
     const auto remark = [&](std::string text) { result_.remarks.push_back(std::move(text)); };
     remark(fmt::format("{} in {}, on {} of {}, which 'workers' counts.", plural(process_.runs, "run"),
                        humanize_duration(recording_.last() - recording_.first()), process_.threads.size(),

@@ -16,10 +16,13 @@ namespace redag::lab {
 
 /// What a simulation of the recorded run repeats of a task.
 struct Replay {
-  Duration phase = 0;
-  std::vector<Duration> demands;    // of its jobs in order: executions, and what delayed them but other callbacks
-  std::vector<Duration> gaps;       // of events in order: from the shortest distance to the one seen
-  metrics::Distribution responses;  // without values where no event says when a job was released
+  Duration offset = 0;               // of the first job, from the begin of the recording
+  std::vector<Duration> executions;  // of its jobs by number
+  std::vector<Duration> delays;      // of the same, by the executor and the machine
+  std::uint32_t rank = 0;            // in the order in which ready callbacks of its kind were taken
+  Duration undisturbed = 0;          // an execution that is longer was probably preempted
+  std::vector<Duration> gaps;        // of events in order: from the shortest distance to the one seen
+  metrics::Distribution responses;   // without values where no event says when a job was released
 };
 
 /// A workload, and what its file says in comments.
@@ -38,6 +41,7 @@ struct ImportedWorkload {
   std::vector<Replay> replays;     // by TaskId
   Duration length = 0;             // of the recording
   Duration overhead = 0;           // of the executor for each job
+  bool is_wall_time = true;        // executions contain preemption
   metrics::Distribution wake_ups;  // from release to begin where all threads were idle
 };
 

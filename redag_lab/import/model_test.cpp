@@ -387,8 +387,57 @@ TEST_F(Import, TellsWakeUpsFromWaiting) {
   EXPECT_EQ(imported.wake_ups.count, 100U);
   EXPECT_EQ(imported.wake_ups.p50, 80'000);
   EXPECT_EQ(imported.overhead, 7000);
-  EXPECT_EQ(imported.replays[0].demands, std::vector<Duration>(100, kMs + 80'000));
-  EXPECT_EQ(imported.replays[1].demands, std::vector<Duration>(100, kMs + 7000));
+  EXPECT_EQ(imported.replays[0].executions, std::vector<Duration>(100, kMs));
+  EXPECT_EQ(imported.replays[0].delays, std::vector<Duration>(100, 80'000));
+  EXPECT_EQ(imported.replays[1].delays, std::vector<Duration>(100, 7000));
+}
+
+// No event tells that a timer was reset. What began while the executor was idle shows its new grid.
+TEST_F(Import, SeesThatATimerWasReset) {
+  const auto node = nodes.node("reset");
+  const auto timer = nodes.timer(node, 10 * kMs);
+  const auto other = nodes.timer(node, 100 * kMs);
+  for (Time k = 1; k <= 100; ++k) {
+    const Time expires = k * 10 * kMs + 4 * kMs;
+    if (k % 10 != 0) nodes.run(1, timer, expires + k * 1000, kMs);
+    if (k % 10 != 0) continue;
+    nodes.run(1, other, k * 10 * kMs, 6 * kMs);  // makes the other one late
+    nodes.run(1, timer, k * 10 * kMs + 6 * kMs, kMs);
+  }
+  const ImportedWorkload imported = import(recording);
+  EXPECT_EQ(imported.replays[0].responses.max, 3 * kMs - 1000);
+  EXPECT_EQ(imported.replays[0].offset, 14 * kMs + 1000);
+  EXPECT_EQ(imported.replays[1].responses.max, 6 * kMs);
+}
+
+TEST_F(Import, NumbersReleasesThatNoRunAnswered) {
+  const auto timer = nodes.timer(nodes.node("late"), 10 * kMs);
+  for (Time k = 1; k <= 30; ++k) {
+    if (k % 10 != 4 && k % 10 != 5) nodes.run(1, timer, k * 10 * kMs, k % 10 == 3 ? 25 * kMs : k * 1000);
+  }
+  const std::vector<Duration> executions = import(recording).replays[0].executions;
+  ASSERT_EQ(executions.size(), 30U);
+  EXPECT_EQ(executions[2], 25 * kMs);
+  EXPECT_EQ(executions[5], 6000);
+  EXPECT_EQ(executions[29], 30'000);
+}
+
+// rclcpp walks through what a wait returned in an order of its own.
+TEST_F(Import, SeesTheOrderOfReadyCallbacks) {
+  const auto node = nodes.node("ordered");
+  const std::vector<RecordedNodes::Handle> timers{nodes.timer(node, 10 * kMs), nodes.timer(node, 10 * kMs),
+                                                  nodes.timer(node, 10 * kMs)};
+  for (Time k = 1; k <= 20; ++k) {
+    nodes.now = k * 10 * kMs;
+    nodes.add(RosEvent::Kind::Wait, 0);
+    for (const std::size_t i : {2U, 0U, 1U}) {
+      nodes.add(RosEvent::Kind::Look, 0);
+      nodes.run(1, timers[i], nodes.now, kMs);
+    }
+  }
+  std::vector<std::uint32_t> ranks;
+  for (const Replay &replay : import(recording).replays) ranks.push_back(replay.rank);
+  EXPECT_THAT(ranks, ElementsAre(1U, 2U, 0U));
 }
 
 // A response counts from the message that was taken, though a later one was sent before the callback began.

@@ -5,10 +5,17 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <utility>
 
 namespace redag::lab {
 
 using Kind = RosEvent::Kind;
+
+namespace {
+
+constexpr Duration kIdle = 200 * kMicrosecond;  // a wait that lasts for longer was for something to be ready
+
+}  // namespace
 
 void Recording::add(const RosEvent &event) {
   if (events_++ == 0) first_ = event.time;
@@ -22,7 +29,8 @@ void Recording::add(const RosEvent &event) {
   const Key key{event.process, event.handle};
   switch (event.kind) {
     case Kind::NodeInit:
-      nodes_[key] = Node{std::string(event.space) + (event.space == "/" ? "" : "/") + std::string(event.name)};
+      nodes_[key] = Node();
+      nodes_[key].name = std::string(event.space) + (event.space == "/" ? "" : "/") + std::string(event.name);
       break;
     case Kind::PublisherInit: publishers_[key] = event.name; break;
     case Kind::SubscriptionInit:
@@ -62,6 +70,8 @@ void Recording::add(const RosEvent &event) {
         callbacks_[member].group = event.other;
       }
       break;
+    case Kind::Wait:
+    case Kind::Look: look(event); [[fallthrough]];
     case Kind::Executor: process.executor_threads.insert(event.thread); break;
     case Kind::Switch: break;
   }
@@ -127,23 +137,55 @@ void Recording::start(const RosEvent &event) {
     }
     note_overlaps(thread, position);
   }
-  const auto released = position == kUnknown ? std::nullopt : release_of(position, thread, event.time);
+  const auto sent = position == kUnknown ? std::nullopt : sent_of(position, thread, event.time);
   thread.taken_by = kUnknown;
   Node *node = position == kUnknown ? nullptr : node_of(position);
-  std::optional<Duration> delay;
-  if (released) delay = note_delay(*released, event.time, thread, node);
+  if (node != nullptr) node->threads.insert(&thread);
+  const std::optional<Time> free = free_since(thread, node);
+  const std::optional<Time> woken = free ? note_turn(thread, position) : std::nullopt;
   if (node != nullptr) ++node->running;
-  thread.runs.push_back({event.handle, position, node, event.time, released, delay, thread.absent, 0, {}});
+  thread.runs.push_back({event.handle, position, node, event.time, sent, free, woken, thread.absent, 0, {}});
 }
 
-/// Returns by how much the executor and the machine delayed a run: other callbacks of its thread and node did not.
-std::optional<Duration> Recording::note_delay(Time released, Time start, Thread &thread, const Node *node) {
+std::optional<Time> Recording::free_since(const Thread &thread, const Node *node) {
   if (!thread.runs.empty()) return std::nullopt;  // another callback called it
   if (node == nullptr || node->running > 0) return std::nullopt;
-  const Time free = std::max({released, thread.last_end, node->last_end});
-  ProcessRecord &process = *thread.process;
-  (free == released ? process.wake_ups : process.turnarounds).add(start - free);
-  return start - free;
+  Time idle = thread.last_end;
+  for (const Thread *other : node->threads) {
+    if (other->runs.empty()) idle = std::min(idle, other->last_end);
+  }
+  return std::max(idle, node->last_end);
+}
+
+void Recording::look(const RosEvent &event) {
+  Thread &thread = thread_of(event);
+  Window &window = windows_[event.process];
+  if (event.kind == Kind::Wait) {
+    ++window.number;
+    window.began = event.time;
+  } else if (std::exchange(thread.waits, false)) {
+    const bool was_idle = event.time - window.began > kIdle;
+    window.woken = was_idle ? std::optional(event.time) : std::nullopt;
+  }
+  thread.waits = event.kind == Kind::Wait;
+  thread.look = event.time;
+  thread.window = window.number;
+}
+
+/// Returns Window::woken of what the callback was taken from.
+std::optional<Time> Recording::note_turn(Thread &thread, std::size_t position) {
+  if (thread.window == 0) return std::nullopt;
+  const CallbackRecord &callback = callbacks_[position];
+  Window &last = windows_[callback.process];
+  // Of two threads, the one that looked first can begin later.
+  if (last.taken_from == thread.window && callbacks_[last.callback].id.kind == callback.id.kind) {
+    const bool in_turn = last.look <= thread.look;
+    ++turns_[in_turn ? std::pair(last.callback, position) : std::pair(position, last.callback)];
+  }
+  last.look = thread.look;
+  last.callback = position;
+  last.taken_from = std::exchange(thread.window, 0);
+  return last.taken_from == last.number ? last.woken : std::nullopt;
 }
 
 Recording::Node *Recording::node_of(std::size_t callback) {
@@ -157,14 +199,8 @@ void Recording::leave(const Run &run, Time now) {
   run.node->last_end = now;
 }
 
-std::optional<Time> Recording::release_of(std::size_t position, const Thread &thread, Time start) const {
+std::optional<Time> Recording::sent_of(std::size_t position, const Thread &thread, Time start) const {
   const CallbackRecord &callback = callbacks_[position];
-  const Duration period = callback.id.period;
-  if (period > 0) {
-    // The timer's grid begins a little before its creation is recorded.
-    const Duration early = std::min(period / 10, kMillisecond);
-    return std::min(start, start + early - (start + early - callback.created) % period);
-  }
   if (callback.id.kind != Callback::Kind::Subscription) return std::nullopt;
   const auto messages = sent_.find(callback.id.name);
   const bool is_stamped = thread.taken_by == position;
@@ -226,12 +262,10 @@ void Recording::end(const RosEvent &event) {
   }
   CallbackRecord &callback = callbacks_[run.callback];
   callback.executed += own;
-  Runs &runs = run.sent.empty() ? callback.quiet : callback.publishing;
-  runs.execution.add(own);
+  (run.sent.empty() ? callback.quiet : callback.publishing).add(own);
   if (callback.ended.size() < kMostRuns) {
-    callback.ended.push_back({run.start, own, run.delay, !run.sent.empty()});
+    callback.ended.push_back({run.start, event.time, own, run.released, run.free, run.woken, !run.sent.empty()});
   }
-  if (run.released) runs.response.add(event.time - *run.released);
   for (const Sent &sent : run.sent) {
     CallbackRecord::Output &output = callback.outputs[*sent.topic];
     ++output.runs;

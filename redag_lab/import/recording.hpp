@@ -6,6 +6,7 @@
 // thread-safe.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <deque>
 #include <map>
@@ -28,18 +29,20 @@ inline constexpr std::size_t kMostRuns = 16384;
 /// Messages of a topic whose times are kept until a callback takes them.
 inline constexpr std::size_t kMostMessages = 32;
 
-/// Times of runs that ended.
-struct Runs {
-  metrics::DurationSketch execution{1024};
-  metrics::DurationSketch response{1024};  // since a timer expired, or a callback sent the message
-};
-
 /// A run that ended.
 struct EndedRun {
   Time start = 0;
+  Time end = 0;
   Duration execution = 0;
-  std::optional<Duration> delay;  // until it began, after its release, and when its thread and its node were free
+  std::optional<Time> released;  // when its message was sent; its timer expired: find_units()
+  std::optional<Time> free;      // since when its node, and a thread that serves the node, ran nothing
+  std::optional<Time> woken;     // when the wait ended that returned it, if the executor idled until then
   bool publishes = false;
+
+  /// By how much the executor and the machine delayed it: other callbacks did not.
+  [[nodiscard]] std::optional<Duration> delay() const {
+    return released && free ? std::optional(start - std::max(*released, *free)) : std::nullopt;
+  }
 };
 
 struct CallbackRecord {
@@ -55,8 +58,8 @@ struct CallbackRecord {
   std::uint64_t runs = 0;  // that began
   Time first_start = 0;
   Time last_start = 0;
-  Runs quiet;       // that published nothing
-  Runs publishing;  // the others
+  metrics::DurationSketch quiet{1024};       // executions of runs that published nothing
+  metrics::DurationSketch publishing{1024};  // of the others
   Duration executed = 0;
   std::map<std::string, Output> outputs;  // by topic
   std::vector<EndedRun> ended;            // the first ones
@@ -76,10 +79,8 @@ struct ProcessRecord {
   bool has_switches = false;                 // the kernel recorded some of these threads
   std::uint64_t runs = 0;
   Duration executed = 0;
-  std::uint64_t unknown_runs = 0;             // of callbacks whose creation was not recorded
-  std::uint64_t torn_runs = 0;                // begin or end is missing
-  metrics::DurationSketch wake_ups{1024};     // delays of runs whose thread and node were idle
-  metrics::DurationSketch turnarounds{1024};  // of the others
+  std::uint64_t unknown_runs = 0;  // of callbacks whose creation was not recorded
+  std::uint64_t torn_runs = 0;     // begin or end is missing
 };
 
 class Recording {
@@ -94,6 +95,8 @@ class Recording {
   [[nodiscard]] bool is_exclusive(std::uint32_t process, std::uint64_t group) const {
     return !reentrant_.contains({process, group});
   }
+  /// How often an executor took the second callback after the first, of the same kind, from what one wait returned.
+  [[nodiscard]] const std::map<std::pair<std::size_t, std::size_t>, std::uint64_t> &turns() const { return turns_; }
   [[nodiscard]] std::uint64_t events() const { return events_; }
   [[nodiscard]] Time first() const { return first_; }
   [[nodiscard]] Time last() const { return last_; }
@@ -101,11 +104,13 @@ class Recording {
  private:
   using Key = std::pair<std::uint32_t, std::uint64_t>;  // process and address
   static constexpr std::size_t kUnknown = SIZE_MAX;
+  struct Thread;
   struct Node {
     std::string name;
     std::uint32_t timers = 0;
     std::size_t running = 0;  // callbacks
     Time last_end = 0;
+    std::set<const Thread *> threads;  // that ran its callbacks
   };
   struct Sent {
     const std::string *topic = nullptr;  // in publishers_
@@ -118,7 +123,8 @@ class Recording {
     Node *node = nullptr;  // of the callback, if known
     Time start = 0;
     std::optional<Time> released;
-    std::optional<Duration> delay;
+    std::optional<Time> free;
+    std::optional<Time> woken;
     Duration absent = 0;  // of the thread, when the run began
     Duration inner = 0;   // execution of callbacks that this run called
     std::vector<Sent> sent;
@@ -130,12 +136,26 @@ class Recording {
     Time last_end = 0;                // of a run
     std::size_t taken_by = kUnknown;  // whose message was taken last, and when it was sent
     Time sent = 0;
+    Time look = 0;             // for work, the last one
+    std::uint64_t window = 0;  // that it looked through; 0: no event says so
+    bool waits = false;
     ProcessRecord *process = nullptr;
+  };
+  /// What an executor took last.
+  struct Window {
+    std::uint64_t number = 0;  // of the last wait
+    Time began = 0;
+    std::optional<Time> woken;  // when it ended, if the executor idled until then
+    std::uint64_t taken_from = 0;
+    Time look = 0;
+    std::size_t callback = kUnknown;
   };
 
   void make(const RosEvent &event, Callback::Kind kind);
-  [[nodiscard]] std::optional<Time> release_of(std::size_t callback, const Thread &thread, Time start) const;
-  static std::optional<Duration> note_delay(Time released, Time start, Thread &thread, const Node *node);
+  [[nodiscard]] std::optional<Time> sent_of(std::size_t callback, const Thread &thread, Time start) const;
+  static std::optional<Time> free_since(const Thread &thread, const Node *node);
+  std::optional<Time> note_turn(Thread &thread, std::size_t callback);
+  void look(const RosEvent &event);
   [[nodiscard]] Node *node_of(std::size_t callback);
   static void leave(const Run &run, Time now);
   [[nodiscard]] std::size_t find(std::uint32_t process, std::uint64_t address) const;
@@ -162,6 +182,8 @@ class Recording {
   std::map<Key, std::uint64_t> unclaimed_;  // callbacks of subscriptions' objects that are not known yet
   std::map<Key, std::size_t> unbound_;      // subscriptions of objects whose callback is not known yet
   std::map<Key, Thread> threads_;
+  std::map<std::uint32_t, Window> windows_;  // by process
+  std::map<std::pair<std::size_t, std::size_t>, std::uint64_t> turns_;
   std::map<std::uint64_t, Key> of_kernel_;
 };
 

@@ -45,7 +45,7 @@ struct Replayed {
 };
 
 /// `workload` is the imported one, or a change of it with the same tasks. `imported` must outlive the result.
-[[nodiscard]] Replayed replay(const ImportedWorkload &imported, const Workload &workload);
+[[nodiscard]] Replayed replay(const ImportedWorkload &imported, const Workload &workload, const Variant &variant);
 
 /// Simulates the recorded run. Errors: those of run_session().
 [[nodiscard]] Result<SelfCheck> check_against_recording(const ImportedWorkload &imported);

@@ -234,6 +234,25 @@ TEST(SimulatedRecording, IsReproducedByTheModelOfItsExecutor) {
   }
 }
 
+// A run that lasted longer than nearly all was preempted, which threads of real-time priority are not.
+TEST(SimulatedRecording, LeavesOutPreemptionInOsMode) {
+  Recording recording;
+  RecordedNodes nodes(recording);
+  const auto timer = nodes.timer(nodes.node("robot"), 10 * kMs);
+  for (Time k = 1; k <= 200; ++k) nodes.run(1, timer, k * 10 * kMs, k == 50 ? 6 * kMs : kMs);
+  ImportedWorkload imported = import(recording);
+  const auto longest = [&](const std::string &executor) {
+    const Replayed replayed = replay(imported, imported.workload, *parse_variant(executor));
+    const Result<Session> session = run_session(replayed.workload, *parse_variant(executor), replayed.options);
+    return session ? session->summary.tasks.front().jobs.response.max : 0;
+  };
+  EXPECT_EQ(longest("ste"), 6 * kMs);
+  EXPECT_EQ(longest("redag-none"), 6 * kMs);
+  EXPECT_EQ(longest("redag-os"), kMs);
+  imported.is_wall_time = false;  // the kernel's events show what an execution really took
+  EXPECT_EQ(longest("redag-os"), 6 * kMs);
+}
+
 // ---- verdicts ----
 
 // On one thread, a long callback of a slow timer makes a fast one late. Both share a node.
@@ -318,11 +337,11 @@ TEST_F(Verdicts, NameChangesThatHelp) {
   EXPECT_EQ(result.outcomes[2].shown, 2U);
   std::set<std::string> words;
   for (const TriedChange &change : result.changes) {
-    EXPECT_EQ(change.outcome.missed, 0U) << change.words;
+    EXPECT_LT(change.outcome.missed, result.outcomes[0].missed) << change.words;
     words.insert(change.words);
   }
   EXPECT_TRUE(words.contains("ReDAG-RT with preemption os"));
-  EXPECT_TRUE(words.contains("/robot timer 10 ms (0) every 20ms instead of 10ms"));
+  EXPECT_TRUE(words.contains("/robot timer 100 ms (1) every 200ms instead of 100ms"));
 }
 
 TEST_F(Verdicts, AreRefusedWhereTheModelDiffers) {

@@ -57,7 +57,7 @@ class FindingUnits {
       std::string why;
       if (callback.id.node.empty()) {
         why = "its node is unknown: the recording began later";
-      } else if (callback.quiet.execution.size() + callback.publishing.execution.size() == 0) {
+      } else if (callback.quiet.size() + callback.publishing.size() == 0) {
         why = "no run of it ended";
       } else if (callback.runs < kFewestRuns && !is_slow) {
         why = fmt::format("ran {}: its rate is unknown", plural(callback.runs, "time"));
@@ -105,7 +105,7 @@ class FindingUnits {
     Duration longest = 0;
     std::uint64_t rounds = UINT64_MAX;
     for (const std::size_t member : members) {
-      const metrics::Distribution execution = callbacks_[member].quiet.execution.distribution();
+      const metrics::Distribution execution = callbacks_[member].quiet.distribution();
       shortest = std::min(shortest, std::max<Duration>(execution.min, 1));
       longest = std::max(longest, execution.max);
       rounds = std::min(rounds, execution.count);
@@ -114,8 +114,8 @@ class FindingUnits {
     std::uint64_t work = 0;
     std::size_t changing = 0;
     for (const std::size_t member : members) {
-      const std::uint64_t runs = callbacks_[member].quiet.execution.size();
-      const std::uint64_t long_runs = longer_than(limit, callbacks_[member].quiet.execution).size();
+      const std::uint64_t runs = callbacks_[member].quiet.size();
+      const std::uint64_t long_runs = longer_than(limit, callbacks_[member].quiet).size();
       work += long_runs;
       if (std::min(long_runs, runs - long_runs) >= kFewestRuns) ++changing;
       if (!is_as_many(runs, rounds)) return 0;
@@ -157,18 +157,16 @@ class FindingUnits {
       std::vector<std::string> names;
       for (const std::size_t member : unit.members) {
         const CallbackRecord &callback = callbacks_[member];
-        unit.execution.merge(callback.publishing.execution);
-        unit.response.merge(callback.publishing.response);
-        if (unit.members.size() == 1) {
-          unit.execution.merge(callback.quiet.execution);
-          unit.response.merge(callback.quiet.response);
-        }
+        unit.execution.merge(callback.publishing);
+        if (unit.members.size() == 1) unit.execution.merge(callback.quiet);
         const Duration limit = limits[unit.members.front()];
-        if (limit > 0) unit.execution.merge(longer_than(limit, callback.quiet.execution));
-        for (const EndedRun &run : callback.ended) {
-          if (unit.members.size() == 1 || run.publishes || (limit > 0 && run.execution > limit)) {
-            unit.runs.push_back(run);
-          }
+        if (limit > 0) unit.execution.merge(longer_than(limit, callback.quiet));
+        const Duration period = callback.id.period;
+        const Time grid = period > 0 ? grid_of(callback) : 0;
+        for (EndedRun run : callback.ended) {
+          if (unit.members.size() > 1 && !run.publishes && (limit == 0 || run.execution <= limit)) continue;
+          if (period > 0) run.released = last_expiry(grid, period, run.start, most_early(period));
+          unit.runs.push_back(run);
         }
         result_.explained += callback.executed;
         names.push_back(is_timer(member) ? "its timer" : callback.id.name);

@@ -43,9 +43,9 @@ class Clusters {
 struct Unit {
   Positions members;  // in Recording::callbacks(); a timer is first
   metrics::DurationSketch execution{1024};
-  metrics::DurationSketch response{1024};
-  std::vector<EndedRun> runs;  // that did the job, in the order of their begin
+  std::vector<EndedRun> runs;  // that did the job, in the order of their begin; those of timers have a release
   Positions predecessors;      // units
+  std::uint32_t rank = 0;      // among ready ones of its kind
   std::vector<std::string> notes;
 };
 
@@ -58,6 +58,14 @@ struct Units {
 
 /// Finds the units of a process, without their predecessors.
 [[nodiscard]] Units find_units(const Recording &recording, std::uint32_t process);
+
+/// Returns a point of a timer's grid, which begins when the timer is created or, later, reset. No event tells of a
+/// reset.
+[[nodiscard]] Time grid_of(const CallbackRecord &timer);
+/// The most by which runs seem to begin before their timer expires: its grid begins before its creation is recorded.
+[[nodiscard]] Duration most_early(Duration period);
+/// Returns when the timer of a run expired, which seems to begin by up to `early` before.
+[[nodiscard]] Time last_expiry(Time grid, Duration period, Time start, Duration early);
 
 /// Fills the predecessors: none of them is in a circle. Notes why an input has none.
 void find_edges(const Recording &recording, std::vector<Unit> &units);

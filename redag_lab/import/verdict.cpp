@@ -61,7 +61,7 @@ class Judging {
     if (options_.progress) options_.progress(static_cast<double>(simulations_++) / kMostSimulations);
     const Result<Variant> variant = parse_variant(executor);
     if (!variant) return tl::unexpected(variant.error());
-    Replayed replayed = replay(imported_, workload);
+    Replayed replayed = replay(imported_, workload, *variant);
     replayed.options.stop = options_.stop;
     Result<Session> session = run_session(replayed.workload, *variant, replayed.options);
     if (!session) return tl::unexpected(std::move(session.error()));
