@@ -223,23 +223,7 @@ void extend_across_rates(const TaskSet &task_set, Bound &bound) {
   }
 }
 
-// A job lends its urgency to a second holder if the group can go to a less urgent job first, or if holders lose what
-// they inherited.
-bool can_inherit_often(const TaskSet &task_set) {
-  const std::uint32_t threads = task_set.platform.max_started;
-  const bool is_limited = threads > 0 && threads < task_set.tasks.size();
-  const bool has_modes = std::any_of(task_set.tasks.begin(), task_set.tasks.end(),
-                                     [](const CompiledTask &task) { return task.wcet_low < task.wcet - task.waits; });
-  return std::any_of(task_set.tasks.begin(), task_set.tasks.end(), [&](const CompiledTask &task) {
-    const bool is_capped = task_set.dags[task.dag.value].max_active > 0;
-    return task.group != kNoGroup && (is_limited || has_modes || is_capped || task.can_sink);
-  });
-}
-
 Outcome apply_by_demand(const TaskSet &task_set) {
-  if (task_set.platform.preempt_overhead > 0 && can_inherit_often(task_set)) {
-    return NotApplicable{"jobs of a group can inherit often, and each time preempt, which no overhead covers"};
-  }
   if (!task_set.groups.empty() && task_set.several_executors) {
     return NotApplicable{"groups of several executors on one processor: a holder need not run for those that wait"};
   }
@@ -256,9 +240,7 @@ Method by_demand() {
       .name = "by_demand",
       .subject = Subject::Task,
       .cite = "docs/analysis.md, \"Any features\"",
-      .assumptions =
-          "any workers, policy, preemption and features; groups with an overhead of preemption only without "
-          "max_active, few threads, HI mode and demotion",
+      .assumptions = "any workers, policy, preemption and features; groups only of one executor",
       .complexity = "pseudo-polynomial; O(tasks) per step, for each task",
       .knows_modes = true,
       .knows_waits = true,

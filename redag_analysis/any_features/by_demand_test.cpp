@@ -133,13 +133,16 @@ dags:
   }
 }
 
-// A holder that inherits preempts once more.
+// A holder that inherits preempts once more, and with a max_active more often.
 TEST(BoundProperty, ByDemandOfGroupsWithOverheads) {
-  testing::BoundCaseLimits limits;
-  limits.max_workers = 3;
-  limits.groups = limits.overheads = limits.jitter = limits.edges = true;
-  limits.max_utilization = 0.8;
-  testing::expect_bound_holds(by_demand(), testing::cases(limits), {.workloads = 300, .include_refused = true});
+  for (const bool caps : {false, true}) {
+    testing::BoundCaseLimits limits;
+    limits.max_workers = 3;
+    limits.groups = limits.overheads = limits.jitter = limits.edges = true;
+    limits.caps = caps;
+    limits.max_utilization = 0.8;
+    testing::expect_bound_holds(by_demand(), testing::cases(limits), {.workloads = 300, .include_refused = true});
+  }
 }
 
 }  // namespace

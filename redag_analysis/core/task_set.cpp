@@ -44,6 +44,7 @@ class Compiler {
       if (!ref.task->group.empty() && !groups.insert(ref.task->group).second) shared_groups_.insert(ref.task->group);
       has_modes_ = has_modes_ || (ref.task->wcet_low > 0 && ref.task->wcet_low < ref.task->wcet);
     }
+    inherit_often_ = task_set_.mode == sched::Preemption::Full && can_inherit_often();
     find_losses();
   }
 
@@ -95,18 +96,56 @@ class Compiler {
 
   // True if preemptions count as time in which nothing runs, as stalls and the release timer do. On several workers the
   // resumed job pays in its own time, which no interference divided by m covers. Where jobs wait, it can pay after the
-  // response of the job that preempted it.
+  // response of the job that preempted it. Where they inherit often, less urgent ones cause preemptions.
   [[nodiscard]] bool preemptions_freeze() const {
-    return (task_set_.platform.workers > 1 || !waits_.empty()) && task_set_.mode != sched::Preemption::None &&
-           task_set_.platform.preempt_overhead > 0;
+    return (task_set_.platform.workers > 1 || !waits_.empty() || inherit_often_) &&
+           task_set_.mode != sched::Preemption::None && task_set_.platform.preempt_overhead > 0;
+  }
+
+  [[nodiscard]] static bool is_demoted_at_limit(const Task &task) {
+    return task.budget > 0 && task.budget < task.wcet && task.on_budget == OnBudget::Demote;
+  }
+
+  // A job lends its urgency to a second holder if the group can go to a less urgent job first, or if holders lose what
+  // they inherited.
+  [[nodiscard]] bool can_inherit_often() const {
+    const std::uint32_t threads = task_set_.platform.max_started;
+    const std::vector<TaskRef> tasks = flatten(workload_);
+    std::uint64_t most_started = 0;
+    for (const TaskRef &ref : tasks) most_started += ref.task->concurrency;
+    const bool is_limited = has_modes_ || (threads > 0 && threads < most_started);
+    return std::any_of(tasks.begin(), tasks.end(), [&](const TaskRef &ref) {
+      const bool is_capped = workload_.dags[ref.dag.value].max_active > 0;
+      return shared_groups_.contains(ref.task->group) && (is_limited || is_capped || is_demoted_at_limit(*ref.task));
+    });
   }
 
   // The most jobs that a job takes a worker from, waits aside: one when it starts, one when a holder of its group
   // inherits from it. If it is demoted, a job that was preempted before takes its own.
   [[nodiscard]] Duration preemptions_by(const Dag &dag, const Task &task) const {
-    const bool is_limited = task.budget > 0 && task.budget < task.wcet && task.on_budget == OnBudget::Demote;
-    const bool can_sink = is_limited || (has_modes_ && dag.criticality != Criticality::High);
+    const bool can_sink = is_demoted_at_limit(task) || (has_modes_ && dag.criticality != Criticality::High);
+    if (inherit_often_) return preemptions_at_events_of(task);
     return 1 + (shared_groups_.contains(task.group) ? 1 : 0) + (can_sink ? 1 : 0);
+  }
+
+  // All workers can change their jobs when the job is released or ends, at its limits, and when it wakes up; at its end
+  // and when it begins to wait, all but its own. The caller adds one for each wait.
+  [[nodiscard]] Duration preemptions_at_events_of(const Task &task) const {
+    const auto waits = static_cast<Duration>(task.waits.size());
+    const bool begins_high = task.wcet_low > 0 && task.wcet_low < task.wcet;
+    const Duration events = 2 + 2 * waits + (is_demoted_at_limit(task) ? 1 : 0) + (begins_high ? 1 : 0);
+    return task_set_.platform.workers * events - 1 - 2 * waits;
+  }
+
+  [[nodiscard]] Duration late_releases(const Task &task) const {
+    return ceil_div(add(task.jitter, task_set_.platform.lateness), std::max<Duration>(task.period, 1));
+  }
+
+  // The jobs of a window beyond those that its length explains.
+  [[nodiscard]] Duration late_or_unfinished(const Task &task) const {
+    const bool waits_for_data = inherit_often_ && task.activation == Activation::Timer && !task.predecessors.empty();
+    const Duration queued = task.overrun == Overrun::Queue ? task.queue_depth : 1;
+    return late_releases(task) + queued + task.concurrency + 1 + (waits_for_data ? 1 : 0);
   }
 
   // Finds the time in which the bounds assume that nothing runs. It is sound to count each loss on one processor as one
@@ -123,13 +162,18 @@ class Compiler {
       lost_.per_second = add(lost_.per_second, static_cast<Duration>(std::min(rate, Int128{kSecond})));
     };
     for (const Dag &dag : workload_.dags) {
+      Duration in_dag = 0;
+      for (const Task &task : dag.tasks) in_dag = add(in_dag, 1 + late_or_unfinished(task));
       for (const Task &task : dag.tasks) {
-        const Duration late = ceil_div(add(task.jitter, platform.lateness), std::max<Duration>(task.period, 1));
+        const Duration late = late_releases(task);
         if (task.activation == Activation::Timer) add_releases(platform.timer_overhead, task, late + 1);
-        // A job also preempts at each wake-up. This includes jobs released before the window.
-        const Duration waiting = (task.overrun == Overrun::Queue ? task.queue_depth : 1) + task.concurrency;
+        // A job also preempts at each wake-up. This includes jobs released before the window. If responses have no
+        // bound, data tasks also have jobs for all that was unfinished before them.
+        const bool follows = inherit_often_ && task.activation == Activation::Data;
         const Duration times = preemptions_by(dag, task) + static_cast<Duration>(task.waits.size());
-        if (preemptions_freeze()) add_releases(multiply(platform.preempt_overhead, times), task, late + waiting + 1);
+        if (preemptions_freeze()) {
+          add_releases(multiply(platform.preempt_overhead, times), task, follows ? in_dag : late_or_unfinished(task));
+        }
       }
     }
     task_set_.frozen = lost_.per_second < kSecond ? lengthened(lost_.longest) : 0;
@@ -432,6 +476,7 @@ class Compiler {
 
   std::string modes_;  // why there is a HI mode
   bool has_modes_ = false;
+  bool inherit_often_ = false;  // a job that waits for its group can lend its urgency to several holders
   std::set<std::string> shared_groups_;
   const Workload &workload_;
   const std::vector<WaitingTime> waits_;  // by TaskId; empty: no task waits

@@ -268,8 +268,8 @@ void check_one(const analysis::Method &method, const BoundGenerator &generator, 
   const executors::ExecutorKind &executor = *executors::find_executor(options.executor);
   const auto task_set = analysis::compile_for(executor, bound_case.workload, bound_case.platform);
   ASSERT_TRUE(task_set) << to_string(task_set.error()) << describe(bound_case);
-  const bool is_covered =
-      task_set->not_analysable.empty() || (task_set->has_waits && method.knows_waits) || options.include_refused;
+  const bool is_covered = task_set->not_analysable.empty() || (task_set->has_waits && method.knows_waits) ||
+                          (options.include_refused && !task_set->is_beyond_numbers);
   if (!is_covered) {
     ++result.not_applicable;
     return;
