@@ -70,7 +70,7 @@ Demand::Demand(const TaskSet &all)
   const std::uint32_t threads = all.platform.max_started;
   few_threads = all.mode == sched::Preemption::Full && threads > 0 && threads < most_started(all);
   for (const CompiledTask &one : all.tasks) {
-    stop = std::max(stop, multiply(one.period, 64));
+    stop = std::max(stop, multiply(one.period, 4096));
     has_waits = has_waits || one.wake_ups > 0;
   }
 }
