@@ -6,7 +6,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <variant>
+
 #include "redag_analysis/analyze/analyze.hpp"
+#include "redag_analysis/any_features/by_demand.hpp"
 #include "redag_analysis/many_workers/dag_shapes.hpp"
 #include "redag_analysis/many_workers/global_dag.hpp"
 #include "redag_analysis/many_workers/global_groups.hpp"
@@ -153,6 +156,35 @@ TEST(Losses, AJobThatWaitsResumesAndPreemptsOnceMore) {
   EXPECT_EQ(task_set->frozen, 8'002) << "ceil(4 * 2 * 1000 / (1 - 200'000 / 1e9))";
   EXPECT_EQ(task_set->tasks[0].waits, 3'000'601) << "ceil(3 ms / (1 - 200'000 / 1e9))";
   EXPECT_EQ(task_set->tasks[0].wcet - task_set->tasks[0].waits, 2'001'401) << "ceil((2 ms + 1 us) / the same)";
+}
+
+// Without a bound of the responses, data tasks have a job for all that was unfinished before them.
+TEST(Losses, WhatIsBehindPreemptsLater) {
+  AnalysisPlatform platform;
+  platform.workers = 2;
+  platform.preempt_overhead = 1000;
+  const Workload chain = testing::make_workload({testing::make_dag("d", {{"a", 10, 2}, {"b", 0, 1, {0}}})}, 2);
+  const Result<TaskSet> task_set = compile(chain, platform);
+  ASSERT_TRUE(task_set);
+  EXPECT_EQ(task_set->frozen, 6'002) << "ceil(2 * 3 * 1000 / (1 - 200'000 / 1e9))";
+  EXPECT_EQ(task_set->frozen_behind, 7'002) << "ceil((2 * 5 - 3) * 1000 / the same)";
+  TaskSet without = *task_set;
+  without.frozen_behind = 0;
+  const auto response = [](const TaskSet &set) {
+    return std::get<Bound>(by_demand().apply(set)).tasks[0].response.value_or(0);
+  };
+  EXPECT_EQ(response(*task_set) - response(without), 7'002);
+}
+
+TEST(Losses, HoldersThatInheritOftenPreemptAtEachEvent) {
+  AnalysisPlatform platform;
+  platform.workers = 2;
+  platform.preempt_overhead = 1000;
+  Workload workload = testing::make_workload({testing::make_dag("d", {{"a", 10, 2}, {"b", 20, 1}})}, 2);
+  for (Task &task : workload.dags[0].tasks) task.group = "g";
+  EXPECT_EQ(compile(workload, platform)->frozen, 12'004) << "ceil(2 * 3 * 2 * 1000 / (1 - 300'000 / 1e9))";
+  workload.dags[0].max_active = 1;
+  EXPECT_EQ(compile(workload, platform)->frozen, 18'009) << "ceil(2 * 3 * (2 + 1) * 1000 / (1 - 450'000 / 1e9))";
 }
 
 TEST(Losses, NothingIsLeft) {

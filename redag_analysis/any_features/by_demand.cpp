@@ -223,7 +223,20 @@ void extend_across_rates(const TaskSet &task_set, Bound &bound) {
   }
 }
 
-Outcome apply_by_demand(const TaskSet &task_set) {
+TaskSet with_time_behind(TaskSet task_set) {
+  const auto lengthen = [&](Duration &time) { time = add(time, task_set.frozen_behind); };
+  lengthen(task_set.frozen);
+  for (CompiledTask &task : task_set.tasks) {
+    if (!task.data) lengthen(task.jitter);
+  }
+  for (Unit &unit : task_set.units) {
+    if (!task_set.tasks[unit.tasks.front()].data) lengthen(unit.jitter);
+  }
+  return task_set;
+}
+
+Outcome apply_by_demand(const TaskSet &compiled) {
+  const TaskSet task_set = with_time_behind(compiled);
   if (!task_set.groups.empty() && task_set.several_executors) {
     return NotApplicable{"groups of several executors on one processor: a holder need not run for those that wait"};
   }

@@ -141,11 +141,20 @@ class Compiler {
     return ceil_div(add(task.jitter, task_set_.platform.lateness), std::max<Duration>(task.period, 1));
   }
 
-  // The jobs of a window beyond those that its length explains.
+  // The jobs of a window beyond those that its length explains, if the response of the task's DAG is at most its
+  // period.
   [[nodiscard]] Duration late_or_unfinished(const Task &task) const {
-    const bool waits_for_data = inherit_often_ && task.activation == Activation::Timer && !task.predecessors.empty();
     const Duration queued = task.overrun == Overrun::Queue ? task.queue_depth : 1;
-    return late_releases(task) + queued + task.concurrency + 1 + (waits_for_data ? 1 : 0);
+    return late_releases(task) + queued + task.concurrency + 1;
+  }
+
+  // The same without that bound: a timer can also wait for data, and data tasks have a job for all that was unfinished
+  // before them.
+  [[nodiscard]] Duration late_or_behind(const Dag &dag, const Task &task) const {
+    if (task.activation == Activation::Timer) return late_or_unfinished(task) + (task.predecessors.empty() ? 0 : 1);
+    Duration jobs = 0;
+    for (const Task &one : dag.tasks) jobs = add(jobs, late_or_unfinished(one) + 2);
+    return jobs;
   }
 
   // Finds the time in which the bounds assume that nothing runs. It is sound to count each loss on one processor as one
@@ -161,22 +170,24 @@ class Compiler {
       const Int128 rate = (Int128{each} * kSecond + task.period - 1) / std::max<Duration>(task.period, 1);
       lost_.per_second = add(lost_.per_second, static_cast<Duration>(std::min(rate, Int128{kSecond})));
     };
+    Duration behind = 0;
     for (const Dag &dag : workload_.dags) {
-      Duration in_dag = 0;
-      for (const Task &task : dag.tasks) in_dag = add(in_dag, 1 + late_or_unfinished(task));
       for (const Task &task : dag.tasks) {
         const Duration late = late_releases(task);
         if (task.activation == Activation::Timer) add_releases(platform.timer_overhead, task, late + 1);
-        // A job also preempts at each wake-up. This includes jobs released before the window. If responses have no
-        // bound, data tasks also have jobs for all that was unfinished before them.
-        const bool follows = inherit_often_ && task.activation == Activation::Data;
+        if (!preemptions_freeze()) continue;
+        // A job also preempts at each wake-up. This includes jobs released before the window.
         const Duration times = preemptions_by(dag, task) + static_cast<Duration>(task.waits.size());
-        if (preemptions_freeze()) {
-          add_releases(multiply(platform.preempt_overhead, times), task, follows ? in_dag : late_or_unfinished(task));
-        }
+        const Duration each = multiply(platform.preempt_overhead, times);
+        add_releases(each, task, late_or_unfinished(task));
+        // The methods for groups that inherit often state no bound of the responses.
+        Duration &lost = inherit_often_ ? lost_.longest : behind;
+        lost = add(lost, multiply(each, late_or_behind(dag, task) - late_or_unfinished(task)));
       }
     }
-    task_set_.frozen = lost_.per_second < kSecond ? lengthened(lost_.longest) : 0;
+    const bool is_lost_for_ever = lost_.per_second >= kSecond;
+    task_set_.frozen = is_lost_for_ever ? 0 : lengthened(lost_.longest);
+    task_set_.frozen_behind = is_lost_for_ever ? 0 : lengthened(behind);
   }
 
   // Lengthens an execution by the share of the processor that is permanently lost.

@@ -190,6 +190,9 @@ struct TaskSet {
   /// lengthens executions. The timers' jitter contains it, because a late and a longer window are equivalent
   /// (docs/analysis.md, "Stalls"). Responses from another point than the nominal release have to add it.
   Duration frozen = 0;
+  /// More such time, in jitter as well, for a method that bounds responses beyond the period: what was unfinished makes
+  /// data tasks preempt later.
+  Duration frozen_behind = 0;
 
   /// The platform's mode; None if it is cooperative and no task has a preemption point.
   sched::Preemption mode = sched::Preemption::Full;
