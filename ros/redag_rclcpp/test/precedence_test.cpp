@@ -86,6 +86,7 @@ class PrecedenceTest : public ModeTest {
     options.trace_capacity = 1 << 16;
   }
   void TearDown() override {
+    spinner.reset();
     executor.reset();
     ModeTest::TearDown();
   }
@@ -435,6 +436,41 @@ dags:
   }
   std::this_thread::sleep_for(20ms);
   EXPECT_EQ(runs.count("control"), 3U);
+  EXPECT_THAT(stop(), IsEmpty());
+}
+
+/// A timer whose call comes late, as if the system had taken the processor from its thread.
+class LateTimer : public rclcpp::WallTimer<std::function<void()>> {
+ public:
+  using WallTimer::WallTimer;
+  auto call() -> decltype(std::declval<rclcpp::TimerBase &>().call()) override {
+    std::this_thread::sleep_for(25ms);
+    return WallTimer::call();
+  }
+};
+
+// A call consumes all expiries that have passed. The last of them may have released the next job by then.
+TEST_P(PrecedenceTest, ATimerThatIsCalledLateRunsForEachJobOfItsPredecessor) {
+  constexpr std::size_t kRounds = 5;
+  const auto trigger = publisher("start");
+  const auto camera = subscribe("start", runs.body("camera", [] {}));
+  std::function<void()> control = runs.body("control", [&] {
+    if (runs.count("camera") < kRounds) trigger->publish(Empty());
+  });
+  const auto timer =
+      std::make_shared<LateTimer>(20ms, std::move(control), node->get_node_base_interface()->get_context());
+  node->get_node_timers_interface()->add_timer(timer, new_group());
+  start(R"(
+name: late
+platform: {workers: 2}
+dags:
+  - name: d
+    tasks:
+      - {name: camera, period: 100ms, callback: {node: /node, subscription: /start}}
+      - {name: control, after: camera, callback: {node: /node, timer: 20ms}}
+)");
+  send(trigger);
+  EXPECT_TRUE(eventually([&] { return runs.count("control") == kRounds; })) << runs.count("control");
   EXPECT_THAT(stop(), IsEmpty());
 }
 

@@ -83,6 +83,10 @@ class TimerCallback final : public Callback {
   void detach() override;
   void admit() override {}
   [[nodiscard]] bool can_join() const override { return true; }
+  [[nodiscard]] redag::Activation join() override {
+    joined_ = true;
+    return redag::Activation::Timer;
+  }
   [[nodiscard]] bool alive() const override { return !timer_.expired() && (!is_owned_ || !owner_.expired()); }
   [[nodiscard]] bool has_rate() const override { return true; }
   [[nodiscard]] Duration stated_period() const override { return period_of(*handle_); }
@@ -133,6 +137,7 @@ class TimerCallback final : public Callback {
   const bool is_owned_;
   const std::shared_ptr<const rcl_timer_t> handle_;  // the handle alone: the last owner of a timer cancels it
   const bool can_be_set_;                            // its clock
+  bool joined_ = false;                              // its jobs wait for those of other callbacks
   rclcpp::JumpHandler::SharedPtr clock_watch_;       // reports that simulated time begins or ends
   Time last_release_ = kNever;                       // guarded by the timer queue's lock
   std::atomic<bool> uncalled_{false};                // released, and not called since
@@ -260,10 +265,12 @@ bool TimerCallback::run(Time /*release*/) {
   bool due = false;
   if (rcl_timer_is_ready(handle_.get(), &due) != RCL_RET_OK) rcl_reset_error();
   uncalled_ = false;
-  if (!due) {
-    // The timer was cancelled or reset, or the previous job started so late that its call consumed this expiry as well.
-    // In the last case the expiry is lost and counts as a miss.
-    if (!restarted_ && !timer->is_canceled()) count_late();
+  const bool stopped = restarted_ || timer->is_canceled();
+  // If the timer was neither cancelled nor reset, the previous job started so late that its call consumed this expiry
+  // as well. Then the expiry is lost and counts as a miss. A job that has waited for others is called nevertheless, in
+  // place of the next expiry: it stands for their data, which no later job gets.
+  if (!due && (stopped || !joined_)) {
+    if (!stopped) count_late();
     reschedule();
     return false;
   }
