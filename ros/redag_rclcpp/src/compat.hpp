@@ -227,8 +227,8 @@ inline rclcpp::Clock::SharedPtr clock_of(rclcpp::TimerBase &timer) {
 // ---- the base class of the executor ----
 
 /// Address of a guard condition of rclcpp::Executor, which holds it by value or by pointer.
-inline const rclcpp::GuardCondition *address_of(const rclcpp::GuardCondition &condition) { return &condition; }
-inline const rclcpp::GuardCondition *address_of(const std::shared_ptr<rclcpp::GuardCondition> &condition) {
+inline rclcpp::GuardCondition *address_of(rclcpp::GuardCondition &condition) { return &condition; }
+inline rclcpp::GuardCondition *address_of(const std::shared_ptr<rclcpp::GuardCondition> &condition) {
   return condition.get();
 }
 
@@ -290,19 +290,38 @@ inline std::vector<rclcpp::CallbackGroup::SharedPtr> keep_groups(rclcpp::Executo
   return kept;
 }
 
-/// Takes removed entities out of the wait set that the base class fills and ReDAGExecutor never uses: no other executor
-/// could wait for them. rclcpp itself does so when it waits next.
-inline void release_removed(rclcpp::Executor &executor) {
+// What the executor executes. Functions of the base class would also put all entities into its wait set, anew for each
+// node. ReDAGExecutor never uses that one, and removed entities would stay there, where no other executor could wait
+// for them.
 #if RCLCPP_VERSION_MAJOR >= 28
+inline rclcpp::executors::ExecutorEntitiesCollector &executed(rclcpp::Executor &executor) {
   struct Opened : rclcpp::Executor {
-    using Executor::collect_entities;
-    using Executor::mutex_;
+    using Executor::collector_;
   };
-  const std::lock_guard<std::mutex> guard(executor.*(&Opened::mutex_));
-  (executor.*(&Opened::collect_entities))();
-#else
-  (void)executor;
-#endif
+  return executor.*(&Opened::collector_);
 }
+inline void add_group(rclcpp::Executor &executor, const rclcpp::CallbackGroup::SharedPtr &group,
+                      const rclcpp::node_interfaces::NodeBaseInterface::SharedPtr &) {
+  executed(executor).add_callback_group(group);
+}
+#else
+struct Executed {
+  rclcpp::Executor &executor;
+  void add_node(const rclcpp::node_interfaces::NodeBaseInterface::SharedPtr &node) const {
+    executor.rclcpp::Executor::add_node(node, false);
+  }
+  void remove_node(const rclcpp::node_interfaces::NodeBaseInterface::SharedPtr &node) const {
+    executor.rclcpp::Executor::remove_node(node, false);
+  }
+  void remove_callback_group(const rclcpp::CallbackGroup::SharedPtr &group) const {
+    executor.rclcpp::Executor::remove_callback_group(group, false);
+  }
+};
+inline Executed executed(rclcpp::Executor &executor) { return {executor}; }
+inline void add_group(rclcpp::Executor &executor, const rclcpp::CallbackGroup::SharedPtr &group,
+                      const rclcpp::node_interfaces::NodeBaseInterface::SharedPtr &node) {
+  executor.rclcpp::Executor::add_callback_group(group, node, false);
+}
+#endif
 
 }  // namespace redag_rclcpp::compat

@@ -63,20 +63,21 @@ ReDAGExecutor::~ReDAGExecutor() { core_->close(); }
 // ---- nodes and groups ----
 
 void ReDAGExecutor::add_node(distribution::NodePointer node, bool notify) {
-  core_->registry().change([&] {
-    rclcpp::Executor::add_node(node, notify);
+  core_->registry().extend([&] {
+    compat::executed(*this).add_node(node);
     core_->registry().add_node(node);
   });
+  if (notify) compat::address_of(interrupt_guard_condition_)->trigger();
 }
 
 void ReDAGExecutor::remove_node(distribution::NodePointer node, bool notify) {
   std::vector<rclcpp::CallbackGroup::SharedPtr> kept;  // destroyed without a lock
-  core_->registry().change([&] {
+  core_->registry().reduce([&] {
     kept = compat::keep_groups(*this);
-    rclcpp::Executor::remove_node(node, notify);
-    compat::release_removed(*this);
+    compat::executed(*this).remove_node(node);
     core_->registry().remove_node(node);
   });
+  if (notify) compat::address_of(interrupt_guard_condition_)->trigger();
 }
 
 // Takes `instance` by value: if no callback is in progress, it is destroyed here, with no lock held.
@@ -87,18 +88,19 @@ void ReDAGExecutor::retire_node(const rclcpp::node_interfaces::NodeBaseInterface
 }
 
 void ReDAGExecutor::add_callback_group(distribution::GroupPointer group, distribution::NodePointer node, bool notify) {
-  core_->registry().change([&] {
-    rclcpp::Executor::add_callback_group(group, node, notify);
+  core_->registry().extend([&] {
+    compat::add_group(*this, group, node);
     core_->registry().add_group(group, node);
   });
+  if (notify) compat::address_of(interrupt_guard_condition_)->trigger();
 }
 
 void ReDAGExecutor::remove_callback_group(distribution::GroupPointer group, bool notify) {
-  core_->registry().change([&] {
-    rclcpp::Executor::remove_callback_group(group, notify);
-    compat::release_removed(*this);
+  core_->registry().reduce([&] {
+    compat::executed(*this).remove_callback_group(group);
     core_->registry().remove_group(group);
   });
+  if (notify) compat::address_of(interrupt_guard_condition_)->trigger();
 }
 
 // ---- spinning ----

@@ -39,13 +39,25 @@ void Registry::close() {
     if (const auto node = weak.lock()) node->get_notify_guard_condition().set_on_trigger_callback(nullptr);
   }
   for (const auto &[weak, name] : group_names_) {
-    if (const auto group = weak.lock()) watch_group(*group, nullptr);
+    if (const auto group = weak.lock()) stop_watching(*group);
   }
 }
 
 // ---- nodes and groups ----
 
-void Registry::change(const std::function<void()> &change) {
+// If nothing else has changed, the groups that are known need not be looked at: a robot adds hundreds of nodes.
+void Registry::extend(const std::function<void()> &change) {
+  Look look = Look::InNewGroups;
+  {
+    const redag::LockGuard guard(collect_lock_);
+    if (stale_) look = Look::Everywhere;
+    change();
+  }
+  collect(look);
+  parts_.bridge.destroy_dropped();
+}
+
+void Registry::reduce(const std::function<void()> &change) {
   {
     const redag::LockGuard guard(collect_lock_);
     change();
@@ -55,14 +67,14 @@ void Registry::change(const std::function<void()> &change) {
 }
 
 void Registry::add_node(const NodeBase::SharedPtr &node) {
-  collect_lock_.assert_held();  // see change()
+  collect_lock_.assert_held();  // see extend()
   forget_gone_nodes();
   nodes_.push_back(node);
-  node->get_notify_guard_condition().set_on_trigger_callback(entities_changed());
+  watch(node->get_notify_guard_condition());
 }
 
 void Registry::remove_node(const NodeBase::SharedPtr &node) {
-  collect_lock_.assert_held();  // see change()
+  collect_lock_.assert_held();  // see reduce()
   std::erase_if(nodes_, [&](const NodeBase::WeakPtr &weak) { return weak.lock() == node; });
   forget_gone_nodes();
   node->get_notify_guard_condition().set_on_trigger_callback(nullptr);
@@ -91,13 +103,13 @@ void Registry::keep_until_done(NodeBase &node, const std::shared_ptr<void> &inst
 }
 
 void Registry::add_group(const rclcpp::CallbackGroup::SharedPtr &group, const NodeBase::SharedPtr &node) {
-  collect_lock_.assert_held();  // see change()
+  collect_lock_.assert_held();  // see extend()
   forget_gone_nodes();
   manual_groups_[group] = node;
 }
 
 void Registry::remove_group(const rclcpp::CallbackGroup::SharedPtr &group) {
-  collect_lock_.assert_held();  // see change()
+  collect_lock_.assert_held();  // see reduce()
   manual_groups_.erase(group);
   forget_group(group);
 }
@@ -116,28 +128,32 @@ void Registry::forget_gone_nodes() {
   std::erase_if(next_index_, [&](const auto &entry) { return names.count(entry.first.first) == 0; });
 }
 
-std::function<void(std::size_t)> Registry::entities_changed() const {
-  return [weak = executor_](std::size_t) {
+// Changes from before are told at once, and need not be heard: whoever begins to watch looks at the entities next.
+void Registry::watch(rclcpp::GuardCondition &condition) const {
+  const auto is_watched = std::make_shared<std::atomic<bool>>(false);
+  condition.set_on_trigger_callback([weak = executor_, is_watched](std::size_t) {
+    if (!*is_watched) return;
     if (const auto executor = weak.lock()) executor->entities_changed();
-  };
+  });
+  *is_watched = true;
 }
 
 // ---- entities ----
 
-void Registry::collect() {
+void Registry::collect(Look look) {
   // Declared before the lock guard: if `found` is the last owner of a user's object, that object is destroyed without
   // the lock.
   std::vector<Entity> found;
   const redag::LockGuard guard(collect_lock_);
   if (closed_) return;
-  stale_ = false;
-  found = find_all();
+  if (look == Look::Everywhere) stale_ = false;
+  found = find(look);
   std::map<const void *, const Entity *> present;
   for (const Entity &entity : found) present.emplace(entity.key, &entity);
 
   std::vector<std::shared_ptr<Callback>> gone;
   for (const auto &[key, callback] : callbacks_) {
-    if (present.count(key) == 0 || !callback->alive()) gone.push_back(callback);
+    if (look == Look::Everywhere && (present.count(key) == 0 || !callback->alive())) gone.push_back(callback);
   }
   for (const auto &callback : gone) remove(callback);
   find_places(found);
@@ -154,11 +170,16 @@ void Registry::collect() {
     absent.push_back({&entity, id_of(entity, next_index_)});
   }
   add(std::exchange(absent, {}), added);
-  for (const std::shared_ptr<Callback> &callback : still_plain()) {
-    absent.push_back({present.at(remove(callback)), callback->id()});
+  const std::vector<std::shared_ptr<Callback>> plain = still_plain();
+  if (look == Look::Everywhere) {
+    for (const auto &callback : plain) absent.push_back({present.at(remove(callback)), callback->id()});
+    add(std::move(absent), added);
+    connect();
+  } else if (plain.empty()) {
+    connect();
+  } else {
+    collect();  // their entities are in other groups
   }
-  add(std::move(absent), added);
-  connect();
   if (!added.empty() && rclcpp::ok(context_)) find_leftovers(context_, added);
 }
 
@@ -169,7 +190,7 @@ bool Registry::is_called_by_owner(const Entity &entity) const {
   return owner == callbacks_.end() || owner->second->in_wait_set();
 }
 
-std::vector<Entity> Registry::find_all() {
+std::vector<Entity> Registry::find(Look look) {
   // Read before the nodes are. A group that is created meanwhile is left for the next time; otherwise it would lack its
   // node.
   const auto groups = groups_();
@@ -198,7 +219,7 @@ std::vector<Entity> Registry::find_all() {
   std::vector<std::pair<std::size_t, rclcpp::CallbackGroup::SharedPtr>> ordered;
   for (const auto &weak : groups) {
     const auto group = weak.lock();
-    if (!group) continue;
+    if (!group || (look == Look::InNewGroups && group_names_.count(group) > 0)) continue;
     const auto position = positions.find(group.get());
     ordered.emplace_back(position == positions.end() ? positions.size() : position->second, group);
   }
@@ -223,7 +244,7 @@ std::string Registry::group_name(const rclcpp::CallbackGroup::SharedPtr &group) 
   const auto [entry, is_new] = group_names_.try_emplace(group);
   if (is_new) {
     entry->second = "g" + std::to_string(next_group_++);
-    watch_group(*group, entities_changed());
+    if (const auto condition = compat::notify_guard_condition(*group, context_)) watch(*condition);
     std::erase_if(group_names_, [](const auto &known) { return known.first.expired(); });
   }
   return group->type() == rclcpp::CallbackGroupType::MutuallyExclusive ? entry->second : std::string();
@@ -231,12 +252,12 @@ std::string Registry::group_name(const rclcpp::CallbackGroup::SharedPtr &group) 
 
 // Another executor can have the group next.
 void Registry::forget_group(const rclcpp::CallbackGroup::SharedPtr &group) {
-  if (group_names_.erase(group) > 0) watch_group(*group, nullptr);
+  if (group_names_.erase(group) > 0) stop_watching(*group);
 }
 
-void Registry::watch_group(rclcpp::CallbackGroup &group, const std::function<void(std::size_t)> &callback) {
+void Registry::stop_watching(rclcpp::CallbackGroup &group) const {
   const auto condition = compat::notify_guard_condition(group, context_);
-  if (condition) condition->set_on_trigger_callback(callback);
+  if (condition) condition->set_on_trigger_callback(nullptr);
 }
 
 redag::CallbackId Registry::id_of(const Entity &found, Counters &counters) const {

@@ -54,9 +54,11 @@ class Registry {
   /// Removes all callbacks. Later collects do nothing.
   void close();
 
-  /// Runs `change` as one step: a thread that collects sees all of it or nothing. `change` tells rclcpp and the
-  /// registry (by add_node(), remove_node(), add_group(), remove_group()) what is to be executed. Then collects.
-  void change(const std::function<void()> &change);
+  /// Run `change` as one step: a thread that collects sees all of it or nothing. It tells rclcpp and the registry what
+  /// is to be executed: for extend() by add_node() and add_group(), for reduce() by remove_node() and remove_group().
+  /// Then they collect.
+  void extend(const std::function<void()> &change);
+  void reduce(const std::function<void()> &change);
   void add_node(const NodeBase::SharedPtr &node);
   void remove_node(const NodeBase::SharedPtr &node);
   /// Holds `instance` until the callbacks of the node are gone and have ended. Call it before remove_node().
@@ -65,7 +67,7 @@ class Registry {
   void remove_group(const rclcpp::CallbackGroup::SharedPtr &group);
 
   /// Adds and removes tasks until they match the entities in the groups.
-  void collect();
+  void collect() { collect(Look::Everywhere); }
   /// True if entities may have come or gone since the last collect().
   [[nodiscard]] bool is_stale() const { return stale_; }
   /// Returns true if it was stale before.
@@ -81,6 +83,9 @@ class Registry {
   [[nodiscard]] std::vector<std::string> unmatched() const;
 
  private:
+  enum class Look : std::uint8_t { Everywhere, InNewGroups };
+
+  void collect(Look look);
   void forget_gone_nodes() REDAG_REQUIRES(collect_lock_);
   /// Next index of a nameless entity, by node and kind; -1: timers of waitables.
   using Counters = std::map<std::pair<std::string, int>, std::uint32_t>;
@@ -110,9 +115,9 @@ class Registry {
   void connect_to(redag::TaskId task, std::vector<redag::TaskId> predecessors) REDAG_REQUIRES(collect_lock_);
   const void *remove(const std::shared_ptr<Callback> &callback) REDAG_REQUIRES(collect_lock_);
   void place(TaskTable::Entry &entry, const Entity &found) REDAG_REQUIRES(collect_lock_);
-  void watch_group(rclcpp::CallbackGroup &group, const std::function<void(std::size_t)> &callback);
-  [[nodiscard]] std::function<void(std::size_t)> entities_changed() const;
-  [[nodiscard]] std::vector<Entity> find_all() REDAG_REQUIRES(collect_lock_);
+  void watch(rclcpp::GuardCondition &condition) const;
+  void stop_watching(rclcpp::CallbackGroup &group) const;
+  [[nodiscard]] std::vector<Entity> find(Look look) REDAG_REQUIRES(collect_lock_);
   [[nodiscard]] bool is_called_by_owner(const Entity &entity) const REDAG_REQUIRES(collect_lock_);
   [[nodiscard]] std::string group_name(const rclcpp::CallbackGroup::SharedPtr &group) REDAG_REQUIRES(collect_lock_);
   void forget_group(const rclcpp::CallbackGroup::SharedPtr &group) REDAG_REQUIRES(collect_lock_);
