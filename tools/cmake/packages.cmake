@@ -91,7 +91,7 @@ included."
   "libredag${soname_version} ${this_version}" "libredag-analysis${soname_version} ${this_version}")
 # CPack's own scripts call ldconfig. Policy 8.1.1 asks for this trigger.
 foreach(library IN ITEMS LIBREDAG LIBREDAG_ANALYSIS)
-  set(CPACK_DEBIAN_${library}_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/cmake/debian/triggers)
+  set(CPACK_DEBIAN_${library}_PACKAGE_CONTROL_EXTRA ${CMAKE_CURRENT_LIST_DIR}/debian/triggers)
 endforeach()
 
 install(FILES ${PROJECT_SOURCE_DIR}/docs/workload.schema.json ${PROJECT_SOURCE_DIR}/docs/robot.schema.json
