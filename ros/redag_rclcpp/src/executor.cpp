@@ -175,8 +175,8 @@ rclcpp::FutureReturnCode ReDAGExecutor::spin_until_future_complete_impl(
 
 void ReDAGExecutor::cancel() {
   core_->cancel_first_spin();
-  rclcpp::Executor::cancel();
   core_->start_no_more();
+  rclcpp::Executor::cancel();  // last: the spin may end, and another one begin, while this thread has no processor
 }
 
 // ---- queries ----

@@ -6,6 +6,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sched.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -273,6 +274,35 @@ TEST_P(ExecutorTest, NoCallbackStartsAfterOneHasCancelledOrShutDown) {
     EXPECT_EQ(calls, 1);
     executor.remove_node(node);
   }
+}
+
+// The thread that cancels gets its processor back only once the next spin() is idle.
+TEST_P(ExecutorTest, ASlowCancelEndsNoLaterSpin) {
+  cpu_set_t one;
+  CPU_ZERO(&one);
+  CPU_SET(sched_getcpu(), &one);
+  std::atomic<int> ticks{0};
+  std::thread canceller([&] {  // threads inherit their processors
+    ASSERT_EQ(sched_setaffinity(0, sizeof one, &one), 0);
+    ReDAGExecutor executor(options);
+    const auto timer = node->create_wall_timer(1ms, [&] { ++ticks; });
+    executor.add_node(node);
+    std::atomic<bool> done{false};
+    const auto spins = std::async(std::launch::async, [&] {
+      while (!done) executor.spin();
+    });
+    const sched_param none{};
+    ASSERT_EQ(sched_setscheduler(0, SCHED_IDLE, &none), 0);
+    for (int i = 0; i < 10 && !HasFailure(); ++i) {
+      const int before = ticks;
+      EXPECT_TRUE(eventually([&] { return ticks > before; }));
+      executor.cancel();
+    }
+    done = true;
+    do executor.cancel();  // a call between two spins is lost
+    while (spins.wait_for(10ms) != std::future_status::ready);
+  });
+  canceller.join();
 }
 
 TEST_P(ExecutorTest, ANodeRemovedWhileSpinningCanJoinAnyOtherExecutor) {
