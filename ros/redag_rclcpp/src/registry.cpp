@@ -153,7 +153,7 @@ void Registry::collect(Look look) {
 
   std::vector<std::shared_ptr<Callback>> gone;
   for (const auto &[key, callback] : callbacks_) {
-    if (look == Look::Everywhere && (present.count(key) == 0 || !callback->alive())) gone.push_back(callback);
+    if ((look == Look::Everywhere && present.count(key) == 0) || !callback->alive()) gone.push_back(callback);
   }
   for (const auto &callback : gone) remove(callback);
   find_places(found);
