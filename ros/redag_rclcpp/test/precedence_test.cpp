@@ -9,6 +9,8 @@
 #include <map>
 #include <mutex>
 #include <random>
+#include <thread>
+#include <utility>
 
 #include <fmt/format.h>
 
