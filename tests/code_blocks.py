@@ -125,7 +125,10 @@ class Page:
         (self.folder / name).write_text(block.text, encoding="utf-8")
         quoted = shlex.quote(name)
         if re.search(r"(?m)^experiment: ", block.text):
-            self.call(f"redag experiment {quoted} --out unit_of_line{block.line} --shard 1/1000000")
+            small = re.sub(r"(?m)^(sets|repetitions): \d+", r"\1: 1", block.text)
+            small = re.sub(r"(?m)^duration: \d+s", "duration: 10ms", small)
+            (self.folder / name).write_text(small, encoding="utf-8")
+            self.call(f"redag experiment {quoted} --out results_of_line{block.line}")
         elif re.search(r"(?m)^overheads:", block.text):
             self.call(f"redag analyze workloads/robot.yaml --overheads {quoted}")
         else:

@@ -11,7 +11,6 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <charconv>
 #include <chrono>
 #include <cstring>
 #include <filesystem>
@@ -72,27 +71,14 @@ Result<std::size_t> read_rows(const std::string &file, const std::string &subjec
 
 }  // namespace
 
-Result<Shard> parse_shard(std::string_view text) {
-  Shard shard;
-  const char *end = text.data() + text.size();
-  const auto [slash, bad_index] = std::from_chars(text.data(), end, shard.index);
-  if (bad_index == std::errc() && slash != end && *slash == '/') {
-    const auto [stop, bad_count] = std::from_chars(slash + 1, end, shard.count);
-    if (bad_count == std::errc() && stop == end && shard.index >= 1 && shard.index <= shard.count) return shard;
-  }
-  return make_error(fmt::format("'{}' is not a shard", text), "write i/n with 1 <= i <= n, such as 1/4");
-}
-
 std::uint64_t checksum(std::string_view text) {
   std::uint64_t hash = 0xcbf29ce484222325ULL;
   for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ULL;
   return hash;
 }
 
-Result<UnitStore> UnitStore::open(const std::string &folder, const std::string &subject, Shard shard,
-                                  const Accept &accept) {
-  const std::string own =
-      shard.count == 1 ? folder + "/units.csv" : fmt::format("{}/units-{}-of-{}.csv", folder, shard.index, shard.count);
+Result<UnitStore> UnitStore::open(const std::string &folder, const std::string &subject, const Accept &accept) {
+  const std::string own = folder + "/units.csv";
   const auto failed = [&own](const char *what) {
     return file_error(own, 0, fmt::format("{}: {}", what, std::strerror(errno)));
   };
@@ -106,13 +92,6 @@ Result<UnitStore> UnitStore::open(const std::string &folder, const std::string &
   const Result<std::size_t> whole = read_rows(own, subject, accept);
   if (!whole) return tl::unexpected<Diagnostics>(whole.error());
   if (::ftruncate(descriptor, static_cast<off_t>(*whole)) != 0) return failed("cannot write");
-  std::error_code error;
-  for (const fs::directory_entry &entry : fs::directory_iterator(folder, error)) {
-    const std::string name = entry.path().filename().string();
-    if (!name.starts_with("units") || !name.ends_with(".csv") || entry.path() == fs::path(own)) continue;
-    const Result<std::size_t> read = read_rows(entry.path().string(), subject, accept);
-    if (!read) return tl::unexpected<Diagnostics>(read.error());
-  }
   if (*whole == 0) {
     if (const Result<void> begun = store.write(subject + "\n"); !begun) {
       return tl::unexpected<Diagnostics>(begun.error());

@@ -19,16 +19,6 @@
 
 namespace redag::experiment {
 
-/// The share of the units that one of several processes runs: those with unit mod count = index - 1.
-struct Shard {
-  std::uint32_t index = 1;  // from 1
-  std::uint32_t count = 1;
-
-  [[nodiscard]] constexpr bool owns(std::uint64_t unit) const { return unit % count == index - 1; }
-};
-/// Parses "2/4". Error: another form, or not 1 <= i <= n.
-[[nodiscard]] Result<Shard> parse_shard(std::string_view text);
-
 /// Returns a hash of the text (FNV-1a).
 [[nodiscard]] std::uint64_t checksum(std::string_view text);
 
@@ -37,11 +27,10 @@ using Accept = std::function<Result<void>(std::uint64_t unit, const std::string 
 /// Not thread-safe.
 class UnitStore {
  public:
-  /// Opens units.csv, or units-i-of-n.csv for a shard, and gives the units of all such files to `accept`; a unit can
-  /// come twice. Leaves out damaged rows: those units are run again. `subject` is one line that names the plan and the
-  /// version. Errors: a file of another subject, a file that cannot be used or that another process writes, and those
-  /// of `accept`.
-  [[nodiscard]] static Result<UnitStore> open(const std::string &folder, const std::string &subject, Shard shard,
+  /// Opens units.csv, and gives its units to `accept`; a unit can come twice. Leaves out damaged rows: those units are
+  /// run again. `subject` is one line that names the plan and the version. Errors: a file of another subject, a file
+  /// that cannot be used or that another process writes, and those of `accept`.
+  [[nodiscard]] static Result<UnitStore> open(const std::string &folder, const std::string &subject,
                                               const Accept &accept);
 
   UnitStore(UnitStore &&other) noexcept;

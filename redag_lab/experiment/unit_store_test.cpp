@@ -40,8 +40,8 @@ class UnitStoreTest : public ::testing::Test {
   void write(const std::string &bytes) const { std::ofstream(file_) << bytes; }
 
   // Opens the store and puts what it holds into `units`.
-  [[nodiscard]] Result<UnitStore> open(Units &units, Shard shard = {}, const std::string &subject = "plan a") const {
-    return UnitStore::open(folder_, subject, shard, [&units](std::uint64_t unit, const std::string &result) {
+  [[nodiscard]] Result<UnitStore> open(Units &units, const std::string &subject = "plan a") const {
+    return UnitStore::open(folder_, subject, [&units](std::uint64_t unit, const std::string &result) {
       units[unit] = result;
       return Result<void>{};
     });
@@ -52,9 +52,9 @@ class UnitStoreTest : public ::testing::Test {
     EXPECT_TRUE(store) << to_string(store.error());
     return units;
   }
-  void fill(const Units &units, Shard shard = {}) const {
+  void fill(const Units &units) const {
     Units before;
-    Result<UnitStore> store = open(before, shard);
+    Result<UnitStore> store = open(before);
     ASSERT_TRUE(store) << to_string(store.error());
     for (const auto &[unit, result] : units) ASSERT_TRUE(store->append(unit, result));
   }
@@ -90,25 +90,13 @@ TEST_F(UnitStoreTest, LeavesOutADamagedRow) {
   EXPECT_EQ(read(), (Units{{0, "01"}, {2, "10"}}));
 }
 
-TEST_F(UnitStoreTest, SharesAFolder) {
-  fill({{0, "01"}}, {1, 2});
-  fill({{1, "11"}}, {2, 2});
-  EXPECT_EQ(read(), (Units{{0, "01"}, {1, "11"}}));
-  Units first;
-  Units second;
-  const Result<UnitStore> one = open(first, {1, 2});
-  EXPECT_TRUE(open(second, {2, 2})) << "each writes its own file";
-  EXPECT_EQ(first, second);
-}
-
 TEST_F(UnitStoreTest, RefusesAnotherSubjectAndOtherFiles) {
   fill({{0, "01"}});
   Units units;
-  const Result<UnitStore> other = open(units, {}, "plan b");
+  const Result<UnitStore> other = open(units, "plan b");
   ASSERT_FALSE(other);
   EXPECT_THAT(to_string(other.error()), HasSubstr("units.csv:1:1: error: holds results of another plan"));
   EXPECT_THAT(to_string(other.error()), HasSubstr("expected 'plan b'"));
-  EXPECT_FALSE(open(units, {1, 2}, "plan b")) << "beside the file of another plan";
   EXPECT_EQ(read(), (Units{{0, "01"}}));
   write("unit,result\n0,01\n");
   EXPECT_FALSE(open(units));
@@ -124,9 +112,8 @@ TEST_F(UnitStoreTest, IsOfOneProcess) {
 
 TEST_F(UnitStoreTest, AnErrorOfTheReaderIsOne) {
   fill({{0, "01"}});
-  const Result<UnitStore> store =
-      UnitStore::open(folder_, "plan a", {},
-                      [](std::uint64_t, const std::string &) -> Result<void> { return make_error("no such unit"); });
+  const Result<UnitStore> store = UnitStore::open(
+      folder_, "plan a", [](std::uint64_t, const std::string &) -> Result<void> { return make_error("no such unit"); });
   EXPECT_FALSE(store);
 }
 
@@ -151,16 +138,6 @@ TEST_F(UnitStoreTest, FullDisk) {
   EXPECT_THAT(to_string(written.error()), HasSubstr("units.csv: error: cannot write"));
   fill({{1, "11"}});
   EXPECT_EQ(read(), (Units{{0, "01"}, {1, "11"}})) << "what was written stays";
-}
-
-TEST(Shards, AreOneOfSeveral) {
-  const Result<Shard> shard = parse_shard("2/4");
-  ASSERT_TRUE(shard);
-  EXPECT_EQ(shard->index, 2U);
-  EXPECT_TRUE(shard->owns(5));
-  EXPECT_FALSE(shard->owns(4));
-  for (const char *bad : {"", "0/2", "3/2", "1", "1/", "/2", "a/b", "1/2x", "-1/2"})
-    EXPECT_FALSE(parse_shard(bad)) << bad;
 }
 
 }  // namespace

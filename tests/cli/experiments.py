@@ -70,16 +70,10 @@ class Experiments(Case):
         self.assertEqual(self.results("killed"), self.results("whole"))
         self.assertTrue(self.json_of("killed")["complete"])
 
-    def same_for_any_number_of_jobs_and_shards(self, plan):
+    def same_for_any_number_of_jobs(self, plan):
         self.run_plan(plan, "one", "-j1")
         self.run_plan(plan, "two", "-j2")
         self.assertEqual(self.results("one"), self.results("two"))
-        for shard in ("1/3", "2/3", "3/3"):
-            self.run_plan(plan, "shared", "--shard", shard)
-            self.assertFalse((self.folder / "shared" / "results.csv").exists())
-        result = self.run_plan(plan, "shared")
-        self.assertNotIn(" units in ", result.stderr, "all of them are done")
-        self.assertEqual(self.results("one"), self.results("shared"))
 
 
 class Acceptance(Experiments):
@@ -88,21 +82,13 @@ class Acceptance(Experiments):
     def plan(self, sets=4, seed=5, periods=5):
         return self.write("plan.yaml", ACCEPTANCE.format(sets=sets, seed=seed, periods=periods))
 
-    def test_same_results_for_any_number_of_jobs_and_shards(self):
-        self.same_for_any_number_of_jobs_and_shards(self.plan(sets=20))
+    def test_same_results_for_any_number_of_jobs(self):
+        self.same_for_any_number_of_jobs(self.plan(sets=20))
         rows = self.rows("one")
         self.assertEqual(len(rows), 2 * 4 * 3)
         self.assertTrue(all(row["sets"] == "20" for row in rows))
         self.run_plan(self.plan(sets=20, seed=6), "other")
         self.assertNotEqual(self.results("one")[1], self.results("other")[1])
-
-    def test_shards_that_are_not_all_there(self):
-        plan = self.plan()
-        self.run_plan(plan, "some", "--shard", "1/2")
-        self.assertEqual(len(units(self.folder / "some")), 16)
-        self.assertIn("16 of 32 units are done already", self.run_plan(plan, "some").stderr)
-        self.run_plan(plan, "whole")
-        self.assertEqual(self.results("whole"), self.results("some"))
 
     def test_killed_and_gone_on(self):
         self.killed_and_gone_on(self.plan(sets=40, periods=40), 320)
@@ -169,8 +155,6 @@ class Acceptance(Experiments):
         bad = self.write("bad.yaml", "experiment: acceptance\nworkers: two\nmethods: [gaun]\n")
         self.expect(redag("experiment", bad, "--out", self.folder / "x"), 2, "bad.yaml:2:10: error: workers must be a whole number")
         plan = self.plan()
-        for shard in ("3/2", "0/1", "auto"):
-            self.expect(redag("experiment", plan, "--out", self.folder / "x", "--shard", shard), 2, f"--shard: '{shard}'")
         for text, words in [("methods: [gaun]", "did you mean 'guan'?"), ("utilization: {from: 1, to: 0.5, step: 1}", "utilization is not a range"),
                             ("sets: 0", "sets must be a whole number from 1"), ("workers: 0", "workers must be"),
                             ("dags: 2\nworkload: {tasks: 1}", "dags 2, workers 4"), ("preemption: auto", "preemption must be"),
@@ -198,8 +182,8 @@ class Factorial(Experiments):
     def plan(self, repetitions=2, duration="1s"):
         return self.write("plan.yaml", FACTORIAL.format(repetitions=repetitions, duration=duration))
 
-    def test_same_results_for_any_number_of_jobs_and_shards(self):
-        self.same_for_any_number_of_jobs_and_shards(self.plan())
+    def test_same_results_for_any_number_of_jobs(self):
+        self.same_for_any_number_of_jobs(self.plan())
         rows = self.rows("one")
         # Factors of ideal and mte: workers x deadlines; of redag and redag-none: bounds as well; of ste: deadlines.
         # Each has two DAGs and the total.
@@ -254,9 +238,6 @@ class Factorial(Experiments):
         self.assertIn("cart.yaml:7:", refused(self.plan(), "plan.yaml:5:13: error: the workload").stderr)
         self.write("cart.yaml", (SOURCE / "workloads" / "clusters.yaml").read_text())
         refused(self.plan(), "an experiment")
-        self.write("cart.yaml", CART)
-        threads = self.write("threads.yaml", "experiment: factorial\nworld: threads\nexecutors: [redag]\nworkloads: [cart.yaml]\n")
-        self.expect(redag("experiment", threads, "--shard", "1/2", "--out", self.folder / "out"), 2, "depend on one machine")
 
     def test_threads(self):
         """Real runs take turns. The ideal runs beside them in virtual time."""

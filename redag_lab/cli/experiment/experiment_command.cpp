@@ -37,7 +37,6 @@ struct Settings {
   std::string plan;
   std::string folder;
   std::string run_workload;
-  experiment::Shard shard;
   std::uint32_t jobs = 0;  // 0: one per processor
 };
 
@@ -63,7 +62,7 @@ Result<FinishedRun> drive(const PlannedRun &planned, const std::string &program)
   return FinishedRun{std::move(session->trace), std::move(session->summary), std::move(session->check)};
 }
 
-/// Runs the units of the share that the folder does not have yet.
+/// Runs the units that the folder does not have yet.
 class Run {
  public:
   Run(LoadedExperiment loaded, const Settings &settings, Console &console)
@@ -74,11 +73,6 @@ class Run {
         done_(experiment_.unit_count()) {}
 
   int run() {
-    if (settings_.shard.count > 1 && experiment_.takes_turns()) {
-      console_.error("--shard: runs on threads or under ROS 2 depend on one machine",
-                     "give each machine a plan and a folder of its own");
-      return kExitBad;
-    }
     if (!ok(prepare_folder(settings_.folder), console_)) return kExitBad;
     const auto known = [this](std::uint64_t unit, const std::string &result) -> Result<void> {
       if (unit < done_.size() && done_[unit]) return {};
@@ -86,7 +80,7 @@ class Run {
       done_[unit] = true;
       return {};
     };
-    Result<UnitStore> store = UnitStore::open(settings_.folder, loaded_.subject, settings_.shard, known);
+    Result<UnitStore> store = UnitStore::open(settings_.folder, loaded_.subject, known);
     if (!ok(store, console_)) return kExitBad;
     const InterruptGuard guard;  // covers writing the results too
     const bool good = work(*store);
@@ -94,7 +88,7 @@ class Run {
     if (InterruptGuard::interrupted()) {
       console_.note("interrupted: the results so far are kept; run the same command to resume\n");
     }
-    const int status = settings_.shard.count > 1 ? kExitOk : show();
+    const int status = show();
     return good ? status : kExitBad;
   }
 
@@ -102,7 +96,7 @@ class Run {
   bool work(UnitStore &store) {
     std::vector<std::uint64_t> units;
     for (std::uint64_t unit = 0; unit < done_.size(); ++unit) {
-      if (settings_.shard.owns(unit) && !done_[unit]) units.push_back(unit);
+      if (!done_[unit]) units.push_back(unit);
     }
     const auto found = static_cast<std::uint64_t>(std::count(done_.begin(), done_.end(), true));
     if (found > 0) console_.note(fmt::format("{} of {} units are done already\n", found, done_.size()));
@@ -174,15 +168,6 @@ Action add_experiment(CLI::App &app) {
   add_count(app, "-j,--jobs", settings->jobs, {1, kMaxJobs},
             "Number of parallel runs (default: one for each processor)")
       ->default_str("");
-  const auto set_shard = [settings](const std::string &text) {
-    const Result<experiment::Shard> shard = experiment::parse_shard(text);
-    if (!shard) reject("--shard", shard.error().front().message, shard.error().front().hint);
-    settings->shard = *shard;
-  };
-  app.add_option_function<std::string>("--shard", set_shard,
-                                       "Run only share i of n, such as 1/4: one for each machine, all with one folder. "
-                                       "The command without it writes the results")
-      ->type_name("i/n");
   app.add_option("--run-workload", settings->run_workload,
                  "Program run_workload of redag_rclcpp_lab, for 'world: ros2' (default: 'ros2 run redag_rclcpp_lab "
                  "run_workload')")

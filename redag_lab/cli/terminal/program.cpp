@@ -71,9 +71,7 @@ constexpr std::array kCommands = {
           "  redag tune workloads/robot.yaml --vary max_active --caps 2-5 --all-trials\n"},
     Entry{"experiment", "Run experiments over many workloads: seeded, parallel, resumable", add_experiment,
           "  redag experiment evaluation/experiments/acceptance_tasks.yaml --out tasks\n"
-          "  redag experiment evaluation/experiments/paper/factorial.yaml --out factorial\n"
-          "  redag experiment evaluation/experiments/acceptance_dags.yaml \\\n"
-          "      --out dags --shard 1/3\n"},
+          "  redag experiment evaluation/experiments/paper/factorial.yaml --out factorial\n"},
     Entry{"events", "Print the events of a recorded run for other tools, or check them", add_events,
           "  redag events results/demo | head\n"
           "  redag events results/demo --check\n"
