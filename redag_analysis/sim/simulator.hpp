@@ -39,7 +39,7 @@ struct Options {
   std::function<Duration(const Task &, TaskId, std::uint32_t number, std::size_t wait)> wait;
   /// Delay of a timer task's release after its nominal time; default: release_jitter().
   std::function<Duration(const Task &, TaskId, std::uint32_t number)> jitter;
-  /// Gap added to the period before the next release, for sporadic tasks (>= 0); default: none, strictly periodic.
+  /// Gap added to the period before the next release (> -period); default: none, strictly periodic.
   std::function<Duration(const Task &, TaskId, std::uint32_t number)> gap;
 };
 

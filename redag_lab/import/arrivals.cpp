@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <span>
 
@@ -34,12 +35,22 @@ Duration round_period(double period) {
   return std::max<Duration>(std::llround(period), 1);
 }
 
-/// Fits a grid to the instants by least squares. Messages that did not come leave points of the grid empty.
+/// Fits a grid to the instants by least squares. Messages that did not come leave points of the grid empty. What came
+/// late together shares a point, until late ones are known to belong to earlier points.
 Arrivals fit_grid(const std::vector<Time> &instants, Duration median) {
-  std::vector<double> points = {0};
-  for (std::size_t i = 1; i < instants.size(); ++i) {
-    const double step = static_cast<double>(instants[i] - instants[i - 1]) / static_cast<double>(median);
-    points.push_back(points.back() + std::max(std::round(step), 1.0));
+  // A phase-locked loop follows the sender: the median is not quite its period.
+  constexpr double kFollow = 0.2;
+  constexpr double kLearn = 0.02;
+  std::vector<double> points;
+  auto length = static_cast<double>(median);
+  double expected = 0;  // when the last point was due, after the first instant
+  for (const Time time : instants) {
+    const auto since = static_cast<double>(time - instants.front());
+    const double step = std::max(std::round((since - expected) / length), 0.0);
+    points.push_back((points.empty() ? 0 : points.back()) + step);
+    expected += step * length;
+    length += kLearn * (since - expected);
+    expected += kFollow * (since - expected);
   }
   const auto count = static_cast<double>(instants.size());
   const double mean_point = std::accumulate(points.begin(), points.end(), 0.0) / count;
@@ -53,8 +64,9 @@ Arrivals fit_grid(const std::vector<Time> &instants, Duration median) {
     variance += point * point;
   }
   const double period = covariance / variance;
-  double earliest = 0;
-  double latest = 0;
+  for (std::size_t i = points.size() - 1; i > 0; --i) points[i - 1] = std::min(points[i - 1], points[i] - 1);
+  double earliest = std::numeric_limits<double>::max();
+  double latest = std::numeric_limits<double>::lowest();
   for (std::size_t i = 0; i < instants.size(); ++i) {
     const double off = static_cast<double>(instants[i] - instants.front()) - points[i] * period;
     earliest = std::min(earliest, off);
@@ -63,8 +75,10 @@ Arrivals fit_grid(const std::vector<Time> &instants, Duration median) {
   Arrivals arrivals;
   arrivals.period = round_period(period);
   arrivals.jitter = std::min(static_cast<Duration>(latest - earliest), arrivals.period);
-  const double missing = points.back() + 1 - count;
-  if (missing > 0) arrivals.note = fmt::format("{:.0f} of {:.0f} did not come", missing, points.back() + 1);
+  const double missing = points.back() - points.front() + 1 - count;
+  if (missing > 0) {
+    arrivals.note = fmt::format("{:.0f} of {:.0f} did not come", missing, points.back() - points.front() + 1);
+  }
   return arrivals;
 }
 

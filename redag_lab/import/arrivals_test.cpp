@@ -27,6 +27,31 @@ TEST(Arrivals, OfALossyBus) {
   EXPECT_THAT(arrivals.note, HasSubstr("20 of 200 did not come"));
 }
 
+// A late sender catches up at once, or leaves instants out.
+TEST(Arrivals, OfALateSender) {
+  std::vector<Time> instants;
+  for (Time k = 0; k < 200; ++k) {
+    if (k == 50) instants.push_back(k * 5 * kMs + 4'500'000);
+    if (k == 100) instants.push_back((k + 1) * 5 * kMs + 100'000);
+    if (k == 150 || k == 151) continue;
+    if (k % 50 != 0) instants.push_back(k * 5 * kMs);
+  }
+  const Arrivals arrivals = estimate_arrivals(instants);
+  EXPECT_EQ(arrivals.period, 5 * kMs);
+  EXPECT_NEAR(static_cast<double>(arrivals.jitter), 5 * kMs, 10'000);  // 5.1 ms late
+  EXPECT_THAT(arrivals.note, HasSubstr("2 of 199 did not come"));
+}
+
+// Most intervals are longer than the period.
+TEST(Arrivals, WhoseMedianIsFarFromThePeriod) {
+  std::vector<Time> instants;
+  for (Time k = 0; k < 4000; ++k) instants.push_back(k * 5 * kMs + (k % 5) * 200'000);
+  const Arrivals arrivals = estimate_arrivals(instants);
+  EXPECT_EQ(arrivals.period, 5 * kMs);
+  EXPECT_NEAR(static_cast<double>(arrivals.jitter), 800'000, 10'000);
+  EXPECT_EQ(arrivals.note, "");
+}
+
 TEST(Arrivals, OfBursts) {
   std::vector<Time> instants;
   for (Time k = 0; k < 100; ++k) {

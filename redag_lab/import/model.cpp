@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "redag/base/text.hpp"
 #include "redag/base/words.hpp"
@@ -196,10 +197,13 @@ class Importing {
     const Duration upper = sorted[sorted.size() * 3 / 4];
     replay.undisturbed = upper + (upper - sorted[sorted.size() / 4]) * 3 / 2;  // Tukey's fence for outliers
     if (task.activation == Activation::Data) return replay;
-    const CallbackRecord &first = first_of(unit);
     replay.offset = std::max<Time>(first_release - recording_.first(), 0);
-    for (std::size_t i = 1; task.phase == Phase::Event && i < first.begun.size(); ++i) {
-      replay.gaps.push_back(std::max<Duration>(first.begun[i] - first.begun[i - 1] - task.period, 0));
+    if (stated > 0) return replay;
+    replay.gaps.push_back(0);
+    Time last = first_release;
+    for (std::size_t i = 1; i < unit.runs.size(); ++i) {
+      const Time release = std::max(unit.runs[i].released.value_or(unit.runs[i].start), last + 1);
+      replay.gaps.push_back(release - std::exchange(last, release) - task.period);
     }
     return replay;
   }

@@ -21,7 +21,7 @@ struct Replay {
   std::vector<Duration> delays;      // of the same, by the executor and the machine
   std::uint32_t rank = 0;            // in the order in which ready callbacks of its kind were taken
   Duration undisturbed = 0;          // an execution that is longer was probably preempted
-  std::vector<Duration> gaps;        // of events in order: from the shortest distance to the one seen
+  std::vector<Duration> gaps;        // of the same before them, beyond the period: as their messages came
   metrics::Distribution responses;   // without values where no event says when a job was released
 };
 

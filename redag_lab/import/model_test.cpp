@@ -456,6 +456,39 @@ TEST_F(Import, KnowsWhichMessageWasTaken) {
   EXPECT_EQ(import(recording).replays[1].responses.p50, 14 * kMs);
 }
 
+// LTTng loses events where a process is killed.
+TEST_F(Import, TrustsTheStampOfAMessageWhoseEventIsLost) {
+  const auto sender = nodes.node("sender");
+  const auto timer = nodes.timer(sender, 10 * kMs);
+  const auto publisher = nodes.publisher(sender, "/x");
+  const auto taker = nodes.subscription(nodes.node("taker"), "/x");
+  for (Time k = 1; k <= 40; ++k) {
+    if (k <= 20) nodes.run(1, timer, k * 10 * kMs, kMs, publisher);
+    nodes.now = k * 10 * kMs + 2 * kMs;
+    nodes.take(2, taker, k * 10 * kMs + kMs);
+    nodes.run(2, taker, nodes.now, kMs);
+  }
+  EXPECT_EQ(import(recording).replays[1].responses.max, 2 * kMs);
+}
+
+// The simulation of the recorded run repeats when messages came, of which the file says the period and jitter only.
+TEST_F(Import, ReplaysMessagesAsTheyCame) {
+  const auto taker = nodes.subscription(nodes.node("taker"), "/x");
+  std::vector<Time> sent;
+  for (Time k = 1; k <= 20; ++k) {
+    sent.push_back(k * 10 * kMs + (k % 3) * kMs / 2);
+    nodes.now = sent.back() + kMs;
+    nodes.take(1, taker, sent.back());
+    nodes.run(1, taker, nodes.now, kMs);
+  }
+  const ImportedWorkload imported = import(recording);
+  const Task &task = task_named(imported, "taker");
+  const Replay &replay = imported.replays[0];
+  EXPECT_NEAR(static_cast<double>(task.jitter), 1.0 * kMs, 0.1 * kMs);
+  ASSERT_EQ(replay.gaps.size(), sent.size());
+  for (std::size_t i = 1; i < sent.size(); ++i) EXPECT_EQ(task.period + replay.gaps[i], sent[i] - sent[i - 1]);
+}
+
 TEST_F(Import, TrustsTheClockOfANearSender) {
   const auto near = nodes.subscription(nodes.node("near"), "/near");
   const auto far = nodes.subscription(nodes.node("far"), "/far");

@@ -214,7 +214,9 @@ std::optional<Time> Recording::sent_of(std::size_t position, const Thread &threa
   const auto distance = [&](Time time) { return std::abs(time - thread.sent); };
   const Time nearest = *std::min_element(messages->second.begin(), messages->second.end(),
                                          [&](Time a, Time b) { return distance(a) < distance(b); });
-  return distance(nearest) <= kMillisecond ? nearest : messages->second.back();
+  if (distance(nearest) <= kMillisecond) return nearest;
+  const bool is_lost = messages->second.back() < thread.sent && thread.sent <= start;  // the event of the message
+  return is_lost ? thread.sent : messages->second.back();
 }
 
 void Recording::note_overlaps(const Thread &thread, std::size_t position) {

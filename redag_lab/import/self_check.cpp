@@ -29,6 +29,7 @@ Replayed replay(const ImportedWorkload &imported, const Workload &workload, cons
   Replayed replayed{workload, {}};
   for (const TaskRef &ref : flatten(workload)) {
     Task &task = replayed.workload.dags[ref.dag.value].tasks[ref.index];
+    task.jitter = 0;  // the gaps contain it
     if (task.phase != Phase::Unknown) continue;
     task.phase = Phase::Common;
     task.offset = imported.replays[ref.id.value].offset;

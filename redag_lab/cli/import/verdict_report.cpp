@@ -87,38 +87,8 @@ std::string figures_of(const Outcome &outcome, std::size_t judged) {
                      format_percent(outcome.worst_response));
 }
 
-}  // namespace
-
-std::string describe(const lab::SelfCheck &check, const StreamTraits &terminal) {
-  Table table({{.title = "response of", .importance = 9},
-               {"p50", true, 5},
-               {"simulated", true, 5},
-               {"p99", true, 6},
-               {"simulated", true, 6},
-               {.title = ""}});
-  std::size_t wrong = 0;
-  for (const lab::ReproducedTask &task : check.tasks) {
-    if (!task.is_reproduced()) ++wrong;
-    table.add({{task.name},
-               {humanize_duration(task.recorded.p50)},
-               {humanize_duration(task.simulated.p50)},
-               {humanize_duration(task.recorded.p99)},
-               {humanize_duration(task.simulated.p99)},
-               {task.is_reproduced() ? "" : "differs", Tint::Bad}});
-  }
-  std::string text = table.render(terminal.width, terminal.colour);
-  text += fmt::format(
-      "The model of {} reproduces {} of {}: p50 within 10 % or {}, p99 within 25 % or {}. An idle thread of the "
-      "recording wakes up that late (median, 99 %). Trust no comparison of the others.\n",
-      check.executor, check.tasks.size() - wrong, plural(check.tasks.size(), "recorded response"),
-      humanize_duration(check.noise.p50), humanize_duration(check.noise.p99));
-  if (!check.unknown.empty()) {
-    text += fmt::format("unknown: when jobs of {} were released\n", join_first(check.unknown, 5));
-  }
-  return text;
-}
-
-std::string describe(const lab::WhatIf &verdict, const Workload &workload, const StreamTraits &terminal) {
+/// Callbacks and executors, and under them what each executor does.
+std::string outcomes_of(const lab::WhatIf &verdict, const Workload &workload, const StreamTraits &terminal) {
   const std::size_t executors = verdict.outcomes.size() / 2;
   const std::uint32_t other = verdict.outcomes[executors].workers;
   Table table({{.title = "callback", .importance = 9},
@@ -158,14 +128,52 @@ std::string describe(const lab::WhatIf &verdict, const Workload &workload, const
     const Outcome &outcome = verdict.outcomes[i];
     text += fmt::format("{} on {}: {}\n", short_name(outcome), outcome.workers, figures_of(outcome, verdict.judged()));
   }
+  return text;
+}
+
+}  // namespace
+
+std::string describe(const lab::SelfCheck &check, const StreamTraits &terminal) {
+  Table table({{.title = "response of", .importance = 9},
+               {"p50", true, 5},
+               {"simulated", true, 5},
+               {"p99", true, 6},
+               {"simulated", true, 6},
+               {.title = ""}});
+  std::size_t wrong = 0;
+  for (const lab::ReproducedTask &task : check.tasks) {
+    if (!task.is_reproduced()) ++wrong;
+    table.add({{task.name},
+               {humanize_duration(task.recorded.p50)},
+               {humanize_duration(task.simulated.p50)},
+               {humanize_duration(task.recorded.p99)},
+               {humanize_duration(task.simulated.p99)},
+               {task.is_reproduced() ? "" : "differs", Tint::Bad}});
+  }
+  std::string text = table.render(terminal.width, terminal.colour);
+  text += fmt::format(
+      "The model of {} reproduces {} of {}: p50 within 10 % or {}, p99 within 25 % or {}. An idle thread of the "
+      "recording wakes up that late (median, 99 %). Trust no comparison of the others.\n",
+      check.executor, check.tasks.size() - wrong, plural(check.tasks.size(), "recorded response"),
+      humanize_duration(check.noise.p50), humanize_duration(check.noise.p99));
+  if (!check.unknown.empty()) {
+    text += fmt::format("unknown: when jobs of {} were released\n", join_first(check.unknown, 5));
+  }
+  return text;
+}
+
+std::string describe(const lab::WhatIf &verdict, const Workload &workload, const StreamTraits &terminal) {
   std::string refused;
   for (const TaskRef &ref : flatten(workload)) {
     const std::string &reason = verdict.refused[ref.id.value];
     if (!reason.empty()) refused += fmt::format("  {}: {}\n", ref.task->name, reason);
   }
-  if (!refused.empty()) text += "\nNo verdict, because the model does not reproduce the recording:\n" + refused;
-  text += verdict.changes.empty() ? "\nNo single change that was tried makes the recorded robot better.\n"
-                                  : "\nWhat would help most, each alone and checked:\n";
+  if (!refused.empty()) refused = "No verdict, because the model does not reproduce the recording:\n" + refused;
+  if (verdict.judged() == 0) return refused;
+  std::string text = outcomes_of(verdict, workload, terminal) + "\n";
+  if (!refused.empty()) text += refused + "\n";
+  text += verdict.changes.empty() ? "No single change that was tried makes the recorded robot better.\n"
+                                  : "What would help most, each alone and checked:\n";
   for (const lab::TriedChange &change : verdict.changes) {
     text += fmt::format("  {}: {}\n", change.words, figures_of(change.outcome, verdict.judged()));
   }
