@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <utility>
 
 namespace redag::sched {
 
@@ -87,6 +88,7 @@ void JobTable::reserve_step() {
 }
 
 void JobTable::collect() {
+  if (!std::exchange(has_removed, false)) return;
   std::vector<bool> in_use(tasks.size(), false);
   for (const Job &job : jobs) {
     if (job.state == JobState::Free) continue;
@@ -95,7 +97,9 @@ void JobTable::collect() {
   }
   std::vector<TaskId> gone;
   for (std::uint32_t t = 0; t < tasks.size(); ++t) {
-    if (tasks[t].life == TaskLife::Removed && !in_use[t]) gone.emplace_back(t);
+    if (tasks[t].life != TaskLife::Removed) continue;
+    has_removed = has_removed || in_use[t];
+    if (!in_use[t]) gone.emplace_back(t);
   }
   for (const TaskId task : gone) retire(task);
   if (!config.reuse_ids) return;

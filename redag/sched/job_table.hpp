@@ -213,6 +213,7 @@ class JobTable {
   Precedence precedence;
   StepBuilder step;
   bool high_mode = false;             // DAGs of lower criticality are degraded
+  bool has_removed = false;           // a task or DAG was removed, and perhaps is not gone
   bool keeps_timer_releases = false;  // timers have no overrun rule: any number of their jobs can wait
   std::uint64_t thread_waits = 0;     // how often only Config::max_started kept a job from starting
 

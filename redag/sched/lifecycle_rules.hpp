@@ -379,19 +379,23 @@ void Lifecycle<D>::remove_dag(DagId dag, Time now) {
     table_.tasks[task.value].life = TaskLife::Removed;
     forget_skip(table_.tasks[task.value]);
   }
+  table_.has_removed = true;
   find_heirs();
   skip_all(Reason::Removed, [&](const Job &job) { return table_.tasks[job.task.value].dag == dag; });
 }
 
 template <Dispatcher D>
-void Lifecycle<D>::remove_task(TaskId task, Time now) {
-  REDAG_CHECK(table_.has(task), "removal of a task that does not exist");
+void Lifecycle<D>::remove_task(TaskId id, Time now) {
+  REDAG_CHECK(table_.has(id), "removal of a task that does not exist");
   table_.step.begin(now);
-  if (table_.tasks[task.value].life != TaskLife::Live) return;
-  table_.tasks[task.value].life = TaskLife::Removed;
-  forget_skip(table_.tasks[task.value]);
-  find_heirs();
-  skip_all(Reason::Removed, [&](const Job &job) { return job.task == task; });
+  TaskState &task = table_.tasks[id.value];
+  if (task.life != TaskLife::Live) return;
+  task.life = TaskLife::Removed;
+  table_.has_removed = true;
+  forget_skip(task);
+  if (task.joined) find_heirs();
+  if (task.waiting == kNil && task.ready_count == 0) return;
+  skip_all(Reason::Removed, [&](const Job &job) { return job.task == id; });
 }
 
 template <Dispatcher D>

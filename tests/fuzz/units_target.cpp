@@ -22,7 +22,7 @@ void units_target(std::string_view input) {
     return acceptance.add(unit, result);
   };
   // What is there can be continued, or the refusal says why.
-  Result<UnitStore> store = UnitStore::open(path.parent_path(), "fuzz", {}, add);
+  Result<UnitStore> store = UnitStore::open(path.parent_path(), "fuzz", add);
   if (!store) {
     REDAG_CHECK(!store.error().empty(), "a refusal says why");
     return;

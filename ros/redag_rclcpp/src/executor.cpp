@@ -63,7 +63,7 @@ ReDAGExecutor::~ReDAGExecutor() { core_->close(); }
 // ---- nodes and groups ----
 
 void ReDAGExecutor::add_node(distribution::NodePointer node, bool notify) {
-  core_->registry().extend([&] {
+  core_->registry().change([&] {
     compat::executed(*this).add_node(node);
     core_->registry().add_node(node);
   });
@@ -72,7 +72,7 @@ void ReDAGExecutor::add_node(distribution::NodePointer node, bool notify) {
 
 void ReDAGExecutor::remove_node(distribution::NodePointer node, bool notify) {
   std::vector<rclcpp::CallbackGroup::SharedPtr> kept;  // destroyed without a lock
-  core_->registry().reduce([&] {
+  core_->registry().change([&] {
     kept = compat::keep_groups(*this);
     compat::executed(*this).remove_node(node);
     core_->registry().remove_node(node);
@@ -88,7 +88,7 @@ void ReDAGExecutor::retire_node(const rclcpp::node_interfaces::NodeBaseInterface
 }
 
 void ReDAGExecutor::add_callback_group(distribution::GroupPointer group, distribution::NodePointer node, bool notify) {
-  core_->registry().extend([&] {
+  core_->registry().change([&] {
     compat::add_group(*this, group, node);
     core_->registry().add_group(group, node);
   });
@@ -96,7 +96,7 @@ void ReDAGExecutor::add_callback_group(distribution::GroupPointer group, distrib
 }
 
 void ReDAGExecutor::remove_callback_group(distribution::GroupPointer group, bool notify) {
-  core_->registry().reduce([&] {
+  core_->registry().change([&] {
     compat::executed(*this).remove_callback_group(group);
     core_->registry().remove_group(group);
   });

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <set>
+#include <string>
 #include <utility>
 
 #include <fmt/format.h>
@@ -34,7 +35,7 @@ void Registry::open(const std::shared_ptr<ExecutorContext> &executor, Groups gro
 void Registry::close() {
   const redag::LockGuard guard(collect_lock_);
   closed_ = true;
-  while (!callbacks_.empty()) remove(callbacks_.begin()->second);
+  while (!callbacks_.empty()) remove(callbacks_.begin()->first);
   for (const auto &weak : nodes_) {
     if (const auto node = weak.lock()) node->get_notify_guard_condition().set_on_trigger_callback(nullptr);
   }
@@ -46,7 +47,7 @@ void Registry::close() {
 // ---- nodes and groups ----
 
 // If nothing else has changed, the groups that are known need not be looked at: a robot adds hundreds of nodes.
-void Registry::extend(const std::function<void()> &change) {
+void Registry::change(const std::function<void()> &change) {
   Look look = Look::InNewGroups;
   {
     const redag::LockGuard guard(collect_lock_);
@@ -57,24 +58,15 @@ void Registry::extend(const std::function<void()> &change) {
   parts_.bridge.destroy_dropped();
 }
 
-void Registry::reduce(const std::function<void()> &change) {
-  {
-    const redag::LockGuard guard(collect_lock_);
-    change();
-  }
-  collect();
-  parts_.bridge.destroy_dropped();
-}
-
 void Registry::add_node(const NodeBase::SharedPtr &node) {
-  collect_lock_.assert_held();  // see extend()
+  collect_lock_.assert_held();  // see change()
   forget_gone_nodes();
   nodes_.push_back(node);
   watch(node->get_notify_guard_condition());
 }
 
 void Registry::remove_node(const NodeBase::SharedPtr &node) {
-  collect_lock_.assert_held();  // see reduce()
+  collect_lock_.assert_held();  // see change()
   std::erase_if(nodes_, [&](const NodeBase::WeakPtr &weak) { return weak.lock() == node; });
   forget_gone_nodes();
   node->get_notify_guard_condition().set_on_trigger_callback(nullptr);
@@ -89,7 +81,7 @@ void Registry::keep_until_done(NodeBase &node, const std::shared_ptr<void> &inst
   const auto keep = [&](const auto &entity) {
     collect_lock_.assert_held();
     const auto callback = callbacks_.find(entity.get());
-    if (callback != callbacks_.end()) callback->second->keep_until_done(instance);
+    if (callback != callbacks_.end()) callback->second.callback->keep_until_done(instance);
   };
   const auto keep_waitable = [&](const rclcpp::Waitable::SharedPtr &waitable) {
     keep(waitable);
@@ -103,13 +95,13 @@ void Registry::keep_until_done(NodeBase &node, const std::shared_ptr<void> &inst
 }
 
 void Registry::add_group(const rclcpp::CallbackGroup::SharedPtr &group, const NodeBase::SharedPtr &node) {
-  collect_lock_.assert_held();  // see extend()
+  collect_lock_.assert_held();  // see change()
   forget_gone_nodes();
   manual_groups_[group] = node;
 }
 
 void Registry::remove_group(const rclcpp::CallbackGroup::SharedPtr &group) {
-  collect_lock_.assert_held();  // see reduce()
+  collect_lock_.assert_held();  // see change()
   manual_groups_.erase(group);
   forget_group(group);
 }
@@ -151,11 +143,13 @@ void Registry::collect(Look look) {
   std::map<const void *, const Entity *> present;
   for (const Entity &entity : found) present.emplace(entity.key, &entity);
 
-  std::vector<std::shared_ptr<Callback>> gone;
-  for (const auto &[key, callback] : callbacks_) {
-    if ((look == Look::Everywhere && present.count(key) == 0) || !callback->alive()) gone.push_back(callback);
+  std::vector<const void *> gone;
+  for (const auto &[key, known] : callbacks_) {
+    const bool is_absent = look == Look::Everywhere && present.count(key) == 0;
+    if (is_absent || left_groups_.count(known.group) > 0 || !known.callback->alive()) gone.push_back(key);
   }
-  for (const auto &callback : gone) remove(callback);
+  left_groups_.clear();
+  for (const void *entity : gone) remove(entity);
   find_places(found);
   Added added;
   std::vector<Found> absent;
@@ -170,9 +164,12 @@ void Registry::collect(Look look) {
     absent.push_back({&entity, id_of(entity, next_index_)});
   }
   add(std::exchange(absent, {}), added);
-  const std::vector<std::shared_ptr<Callback>> plain = still_plain();
+  const std::vector<Placed> plain = still_plain();
   if (look == Look::Everywhere) {
-    for (const auto &callback : plain) absent.push_back({present.at(remove(callback)), callback->id()});
+    for (const Placed &placed : plain) {
+      remove(placed.entity);
+      absent.push_back({present.at(placed.entity), placed.callback->id()});
+    }
     add(std::move(absent), added);
     connect();
   } else if (plain.empty()) {
@@ -187,52 +184,53 @@ void Registry::collect(Look look) {
 bool Registry::is_called_by_owner(const Entity &entity) const {
   if (entity.owner == nullptr) return false;
   const auto owner = callbacks_.find(entity.owner);
-  return owner == callbacks_.end() || owner->second->in_wait_set();
+  return owner == callbacks_.end() || owner->second.callback->in_wait_set();
 }
 
 std::vector<Entity> Registry::find(Look look) {
   // Read before the nodes are. A group that is created meanwhile is left for the next time; otherwise it would lack its
   // node.
-  const auto groups = groups_();
-  std::map<const rclcpp::CallbackGroup *, std::string> nodes;
-  std::map<const rclcpp::CallbackGroup *, std::size_t> positions;
-  std::set<const rclcpp::CallbackGroup *> defaults;
-  for (const auto &weak : nodes_) {
-    if (const auto node = weak.lock()) {
-      defaults.insert(node->get_default_callback_group().get());
-      node->for_each_callback_group([&](const rclcpp::CallbackGroup::SharedPtr &group) {
-        nodes.emplace(group.get(), node->get_fully_qualified_name());
-        positions.emplace(group.get(), positions.size());
-      });
-    }
+  struct Position {
+    std::size_t order = SIZE_MAX;
+    std::string node;
+    bool is_default = false;
+  };
+  std::map<rclcpp::CallbackGroup::SharedPtr, Position> positions;
+  for (const auto &weak : groups_()) {
+    const auto group = weak.lock();
+    if (group && (look == Look::Everywhere || group_names_.count(group) == 0)) positions.try_emplace(group);
   }
-  for (const auto &[group, weak] : manual_groups_) {
-    const auto node = weak.lock();
-    if (const auto strong = group.lock(); strong && node) {
-      defaults.insert(node->get_default_callback_group().get());
-      nodes.emplace(strong.get(), node->get_fully_qualified_name());
-    }
-  }
-
+  if (positions.empty()) return {};
+  std::erase_if(group_names_, [](const auto &known) { return known.first.expired(); });
   // rclcpp's order is that of addresses. Names that are counted, and ties of priorities, have to be the same in each
   // run.
-  std::vector<std::pair<std::size_t, rclcpp::CallbackGroup::SharedPtr>> ordered;
-  for (const auto &weak : groups) {
-    const auto group = weak.lock();
-    if (!group || (look == Look::InNewGroups && group_names_.count(group) > 0)) continue;
-    const auto position = positions.find(group.get());
-    ordered.emplace_back(position == positions.end() ? positions.size() : position->second, group);
+  std::size_t order = 0;
+  const auto set_node = [&](const rclcpp::CallbackGroup::SharedPtr &group, NodeBase &node) {
+    const auto position = positions.find(group);
+    if (position == positions.end() || position->second.order != SIZE_MAX) return;
+    position->second = {order++, node.get_fully_qualified_name(), group == node.get_default_callback_group()};
+  };
+  for (const auto &weak : nodes_) {
+    const auto node = weak.lock();
+    if (node) node->for_each_callback_group([&](const auto &group) { set_node(group, *node); });
   }
-  std::stable_sort(ordered.begin(), ordered.end(), [](const auto &a, const auto &b) { return a.first < b.first; });
+  for (const auto &[weak, weak_node] : manual_groups_) {
+    const auto group = weak.lock();
+    const auto node = weak_node.lock();
+    if (group && node) set_node(group, *node);
+  }
+  std::vector<std::pair<Position, rclcpp::CallbackGroup::SharedPtr>> ordered;
+  for (auto &[group, position] : positions) ordered.emplace_back(std::move(position), group);
+  std::stable_sort(ordered.begin(), ordered.end(), [](auto &a, auto &b) { return a.first.order < b.first.order; });
 
   std::vector<Entity> result;
-  for (const auto &[order, group] : ordered) {
+  for (const auto &[position, group] : ordered) {
     (void)group_name(group);  // Watches empty groups, too, because an entity may be created in them.
     const std::size_t first = result.size();
     find_entities(group, result);
     for (std::size_t i = first; i < result.size(); ++i) {
-      result[i].id.node = nodes[group.get()];
-      result[i].in_default_group = defaults.count(group.get()) > 0;
+      result[i].id.node = position.node;
+      result[i].in_default_group = position.is_default;
     }
   }
   return result;
@@ -245,13 +243,13 @@ std::string Registry::group_name(const rclcpp::CallbackGroup::SharedPtr &group) 
   if (is_new) {
     entry->second = "g" + std::to_string(next_group_++);
     if (const auto condition = compat::notify_guard_condition(*group, context_)) watch(*condition);
-    std::erase_if(group_names_, [](const auto &known) { return known.first.expired(); });
   }
   return group->type() == rclcpp::CallbackGroupType::MutuallyExclusive ? entry->second : std::string();
 }
 
 // Another executor can have the group next.
 void Registry::forget_group(const rclcpp::CallbackGroup::SharedPtr &group) {
+  left_groups_.insert(group.get());
   if (group_names_.erase(group) > 0) stop_watching(*group);
 }
 
@@ -289,7 +287,7 @@ void Registry::add(std::vector<Found> found, Added &added) {
     const bool is_timer = entry.id.kind == redag::Callback::Kind::Timer;
     const bool waits = entry.configured && callback->can_join() && (is_timer || has_predecessor(its_place));
     if (waits) entry.task.activation = callback->join();
-    if (entry.configured) placed_.emplace(its_place, Placed{callback, waits});
+    if (entry.configured) placed_.emplace(its_place, Placed{callback, one.entity->key, waits});
     tasks.push_back({dag_ids_[entry.dag], entry.rank, entry.task,
                      [callback](const redag::runtime::Job &job) { return callback->execute(job); }, callback});
   }
@@ -297,7 +295,7 @@ void Registry::add(std::vector<Found> found, Added &added) {
   for (std::size_t i = 0; i < ids.size(); ++i) {
     const std::shared_ptr<Callback> callback = entries[i].callback;
     parts_.tasks.set(ids[i], std::move(entries[i]));
-    callbacks_[found[i].entity->key] = callback;
+    callbacks_[found[i].entity->key] = {callback, found[i].entity->group.get()};
     added.push_back(callback);
     if (callback->attach(ids[i])) parts_.bridge.add(callback);
   }
@@ -328,15 +326,10 @@ void Registry::place(TaskTable::Entry &entry, const Entity &found) {
   task.concurrency = task.group.empty() ? workers_ : 1;
 }
 
-// Returns the key of its entity.
-const void *Registry::remove(const std::shared_ptr<Callback> &gone) {
-  const std::shared_ptr<Callback> callback = gone;
-  const void *key = nullptr;
-  const auto entry = std::find_if(callbacks_.begin(), callbacks_.end(), [&](auto &e) { return e.second == callback; });
-  if (entry != callbacks_.end()) {
-    key = entry->first;
-    callbacks_.erase(entry);
-  }
+void Registry::remove(const void *entity) {
+  const auto known = callbacks_.extract(entity);
+  if (known.empty()) return;  // the destructor of a user's object has removed it meanwhile
+  const std::shared_ptr<Callback> callback = known.mapped().callback;
   std::erase_if(placed_, [&](const auto &placed) { return placed.second.callback == callback; });
   callback->detach();
   parts_.timer.settle();  // afterwards the id may be another task's
@@ -351,7 +344,6 @@ const void *Registry::remove(const std::shared_ptr<Callback> &gone) {
   }
   parts_.tasks.drop(task);
   parts_.engine.remove_task(task);
-  return key;
 }
 
 // ---- precedence ----
@@ -386,10 +378,10 @@ bool Registry::has_predecessor(Place place) const {
 }
 
 // Returns the callbacks that were added before any of their predecessors, and that could wait for one now.
-std::vector<std::shared_ptr<Callback>> Registry::still_plain() const {
-  std::vector<std::shared_ptr<Callback>> plain;
+std::vector<Registry::Placed> Registry::still_plain() const {
+  std::vector<Placed> plain;
   for (const auto &[place, placed] : placed_) {
-    if (!placed.waits && has_predecessor(place) && placed.callback->can_join()) plain.push_back(placed.callback);
+    if (!placed.waits && has_predecessor(place) && placed.callback->can_join()) plain.push_back(placed);
   }
   return plain;
 }

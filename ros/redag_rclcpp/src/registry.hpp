@@ -12,6 +12,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -54,11 +55,9 @@ class Registry {
   /// Removes all callbacks. Later collects do nothing.
   void close();
 
-  /// Run `change` as one step: a thread that collects sees all of it or nothing. It tells rclcpp and the registry what
-  /// is to be executed: for extend() by add_node() and add_group(), for reduce() by remove_node() and remove_group().
-  /// Then they collect.
-  void extend(const std::function<void()> &change);
-  void reduce(const std::function<void()> &change);
+  /// Runs `change` as one step: a thread that collects sees all of it or nothing. It tells rclcpp and the registry what
+  /// is to be executed, by the functions below. Then collects.
+  void change(const std::function<void()> &change);
   void add_node(const NodeBase::SharedPtr &node);
   void remove_node(const NodeBase::SharedPtr &node);
   /// Holds `instance` until the callbacks of the node are gone and have ended. Call it before remove_node().
@@ -91,8 +90,13 @@ class Registry {
   using Counters = std::map<std::pair<std::string, int>, std::uint32_t>;
   /// A task of the workload: its DAG, and its position there.
   using Place = std::pair<std::uint32_t, std::uint32_t>;
+  struct Known {
+    std::shared_ptr<Callback> callback;
+    const rclcpp::CallbackGroup *group = nullptr;
+  };
   struct Placed {
     std::shared_ptr<Callback> callback;
+    const void *entity = nullptr;
     bool waits = false;  // for the predecessors that are present
   };
 
@@ -110,10 +114,10 @@ class Registry {
   void warn(std::string text);
   [[nodiscard]] const std::vector<std::uint32_t> &predecessors_of(Place place) const;
   [[nodiscard]] bool has_predecessor(Place place) const REDAG_REQUIRES(collect_lock_);
-  [[nodiscard]] std::vector<std::shared_ptr<Callback>> still_plain() const REDAG_REQUIRES(collect_lock_);
+  [[nodiscard]] std::vector<Placed> still_plain() const REDAG_REQUIRES(collect_lock_);
   void connect() REDAG_REQUIRES(collect_lock_);
   void connect_to(redag::TaskId task, std::vector<redag::TaskId> predecessors) REDAG_REQUIRES(collect_lock_);
-  const void *remove(const std::shared_ptr<Callback> &callback) REDAG_REQUIRES(collect_lock_);
+  void remove(const void *entity) REDAG_REQUIRES(collect_lock_);
   void place(TaskTable::Entry &entry, const Entity &found) REDAG_REQUIRES(collect_lock_);
   void watch(rclcpp::GuardCondition &condition) const;
   void stop_watching(rclcpp::CallbackGroup &group) const;
@@ -137,11 +141,12 @@ class Registry {
   mutable RecursiveMutex collect_lock_;  // recursive: destructors of users' objects run while it is held
   std::unique_ptr<redag::CallbackMatcher> matcher_ REDAG_PT_GUARDED_BY(collect_lock_);  // null: no workload
   std::vector<NodeBase::WeakPtr> nodes_ REDAG_GUARDED_BY(collect_lock_);
-  std::map<const void *, std::shared_ptr<Callback>> callbacks_ REDAG_GUARDED_BY(collect_lock_);  // by entity
-  std::multimap<Place, Placed> placed_ REDAG_GUARDED_BY(collect_lock_);  // callbacks that the workload names
-  std::map<Place, int> places_ REDAG_GUARDED_BY(collect_lock_);          // how many, with those yet to be added
+  std::map<const void *, Known> callbacks_ REDAG_GUARDED_BY(collect_lock_);  // by entity
+  std::multimap<Place, Placed> placed_ REDAG_GUARDED_BY(collect_lock_);      // callbacks that the workload names
+  std::map<Place, int> places_ REDAG_GUARDED_BY(collect_lock_);              // how many, with those yet to be added
   std::map<redag::TaskId, std::vector<redag::TaskId>> predecessors_ REDAG_GUARDED_BY(collect_lock_);  // the engine's
   ByGroup<std::string> group_names_ REDAG_GUARDED_BY(collect_lock_);
+  std::set<const rclcpp::CallbackGroup *> left_groups_ REDAG_GUARDED_BY(collect_lock_);  // since the last collect()
   ByGroup<NodeBase::WeakPtr> manual_groups_ REDAG_GUARDED_BY(collect_lock_);
   Counters next_index_ REDAG_GUARDED_BY(collect_lock_);
   std::uint64_t next_group_ REDAG_GUARDED_BY(collect_lock_) = 0;
