@@ -5,8 +5,8 @@
 // (peers.hpp). The executors take turns in one process, round by round. Prints medians over the rounds, and in brackets
 // the least and the most of them.
 //
-//   ros2 run redag_rclcpp_lab bench_executors [--rounds 5] [--seconds 1] [--workers 2] [--only timer_idle,...]
-//       [--executors mte,redag-none,...]
+//   ros2 run redag_rclcpp_lab bench_executors --help
+#include <malloc.h>
 #include <sched.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -18,6 +18,8 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <ctime>
+#include <fstream>
 #include <functional>
 #include <map>
 #include <memory>
@@ -25,8 +27,10 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
+#include "command_line.hpp"
 #include "contenders.hpp"
 #include "phased_timer.hpp"
 #include "rclcpp/rclcpp.hpp"
@@ -40,20 +44,14 @@ using namespace std::chrono_literals;
 using redag_rclcpp::lab::Contender;
 using redag_rclcpp::lab::contenders;
 using redag_rclcpp::lab::median;
+using redag_rclcpp::lab::Samples;
 using Message = std_msgs::msg::UInt64;
 using std::chrono::nanoseconds;
 using std::chrono::steady_clock;
 
 std::int64_t now_ns() { return steady_clock::now().time_since_epoch().count(); }
 
-double cpu_seconds() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval &t) {
-    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
-  };
-  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-}
+double cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 // Context switches of the process.
 double switches() {
@@ -62,17 +60,14 @@ double switches() {
   return static_cast<double>(usage.ru_nvcsw + usage.ru_nivcsw);
 }
 
-/// Values in microseconds unless the measurement says otherwise.
-struct Sample {
-  std::vector<double> values;
-  void add(double value) { values.push_back(value); }
-  [[nodiscard]] double at(double share) {
-    if (values.empty()) return 0;
-    const auto n = static_cast<std::size_t>(share * static_cast<double>(values.size() - 1));
-    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(n), values.end());
-    return values[n];
-  }
-};
+double resident_mb() {
+  malloc_trim(0);
+  std::size_t pages = 0;
+  std::ifstream("/proc/self/statm") >> pages >> pages;
+  return static_cast<double>(pages) * static_cast<double>(getpagesize()) / 1e6;
+}
+
+double us(const Samples &samples, double share) { return samples.milliseconds(share) * 1e3; }
 
 using Figures = std::map<std::string, double>;
 
@@ -106,10 +101,10 @@ Figures timer_lateness(rclcpp::Executor &executor, double seconds, nanoseconds p
   auto fast = node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive);
   auto slow = node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive);
   const redag::Time first = redag_rclcpp::lab::timer_clock_now() + nanoseconds(200ms).count();
-  Sample lateness;
+  Samples lateness;
   std::int64_t last_point = -1;
   redag_rclcpp::lab::PhasedTimer timer(*node, fast, first, period.count(), [&](std::int64_t point) {
-    lateness.add(static_cast<double>(redag_rclcpp::lab::timer_clock_now() - first - point * period.count()) / 1e3);
+    lateness.add(redag_rclcpp::lab::timer_clock_now() - first - point * period.count());
     last_point = point;
   });
   std::optional<redag_rclcpp::lab::PhasedTimer> background;
@@ -125,9 +120,9 @@ Figures timer_lateness(rclcpp::Executor &executor, double seconds, nanoseconds p
     used = cpu_seconds() - before;
   }
   executor.remove_node(node);
-  const auto called = static_cast<double>(lateness.values.size());
-  Figures figures{{"p50_us", lateness.at(0.5)},
-                  {"p99_us", lateness.at(0.99)},
+  const auto called = static_cast<double>(lateness.size());
+  Figures figures{{"p50_us", us(lateness, 0.5)},
+                  {"p99_us", us(lateness, 0.99)},
                   {"lost_%", 100.0 * (1.0 - called / static_cast<double>(last_point + 1))}};
   if (load == 0ns) figures["cpu_s_per_10k"] = used / called * 1e4;
   return figures;
@@ -136,9 +131,9 @@ Figures timer_lateness(rclcpp::Executor &executor, double seconds, nanoseconds p
 // Latency from publish() to the start of the callback, at 500 Hz.
 Figures publish_latency(rclcpp::Executor &executor, double seconds, bool intra_process) {
   auto node = std::make_shared<rclcpp::Node>("bench", rclcpp::NodeOptions().use_intra_process_comms(intra_process));
-  Sample latency;
+  Samples latency;
   auto subscription = node->create_subscription<Message>("latency", rclcpp::QoS(10), [&](Message::UniquePtr message) {
-    latency.add(static_cast<double>(now_ns() - static_cast<std::int64_t>(message->data)) / 1e3);
+    latency.add(now_ns() - static_cast<std::int64_t>(message->data));
   });
   auto publisher = node->create_publisher<Message>("latency", rclcpp::QoS(10));
   executor.add_node(node);
@@ -154,7 +149,7 @@ Figures publish_latency(rclcpp::Executor &executor, double seconds, bool intra_p
     std::this_thread::sleep_for(50ms);
   }
   executor.remove_node(node);
-  return {{"p50_us", latency.at(0.5)}, {"p99_us", latency.at(0.99)}};
+  return {{"p50_us", us(latency, 0.5)}, {"p99_us", us(latency, 0.99)}};
 }
 
 // Time from spin() to the callback for a message that was there before, and from cancel() to the end of spin().
@@ -280,6 +275,49 @@ Figures first_messages(rclcpp::Executor &executor, double seconds) {
   return figures;
 }
 
+// What 4,800 callbacks of 200 nodes cost: each node has 12 groups of a timer and a subscription. Executors can look at
+// new nodes later: nodes are added, or removed, once a message reaches the last one.
+Figures many_callbacks(rclcpp::Executor &executor, double seconds) {
+  std::vector<rclcpp::Node::SharedPtr> nodes;
+  std::vector<std::shared_ptr<void>> kept;
+  std::atomic<int> reached{0};
+  for (int n = 0; n < 200; ++n) {
+    const auto node = nodes.emplace_back(std::make_shared<rclcpp::Node>("bench" + std::to_string(n)));
+    for (int i = 0; i < 12; ++i) {
+      rclcpp::SubscriptionOptions own_group;
+      own_group.callback_group = node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive);
+      kept.push_back(own_group.callback_group);
+      kept.push_back(node->create_wall_timer(
+          500ms + i * 10ms, [] {}, own_group.callback_group));
+      const auto called = [&](const Message &) { reached.fetch_add(1), reached.notify_one(); };
+      const std::string topic = "bench" + std::to_string(n) + "_" + std::to_string(i);
+      kept.push_back(node->create_subscription<Message>(topic, rclcpp::QoS(10), called, own_group));
+    }
+  }
+  const auto publisher = nodes.back()->create_publisher<Message>("bench199_11", rclcpp::QoS(10));
+  Figures figures;
+  {
+    Spinning spinning(executor);
+    const double memory = resident_mb();
+    double before = cpu_seconds();
+    const auto used = [&] { return cpu_seconds() - std::exchange(before, cpu_seconds()); };
+    auto reach = [&, wanted = 0]() mutable {
+      publisher->publish(Message());
+      reached.wait(wanted++);
+      return used();
+    };
+    for (const auto &node : nodes) executor.add_node(node);
+    figures["add_cpu_s"] = reach();
+    std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+    figures["used_%"] = used() / seconds * 100;
+    figures["memory_mb"] = resident_mb() - memory;
+    for (std::size_t n = 0; n + 1 < nodes.size(); ++n) executor.remove_node(nodes[n]);
+    figures["remove_cpu_s"] = reach();
+  }
+  executor.remove_node(nodes.back());
+  return figures;
+}
+
 // The publishing process of arrivals_loaded: 100 Hz, above all threads it competes with.
 int publish_for(double seconds) {
   sched_param priority{95};
@@ -308,15 +346,12 @@ Figures arrivals_loaded(rclcpp::Executor &executor, double seconds) {
     _exit(2);
   }
   auto node = std::make_shared<rclcpp::Node>("bench");
-  Sample latency;
+  Samples latency;
   rclcpp::SubscriptionOptions own_group;
   own_group.callback_group = node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive);
   auto subscription = node->create_subscription<Message>(
       "arrivals", rclcpp::QoS(10),
-      [&](Message::UniquePtr message) {
-        latency.add(static_cast<double>(now_ns() - static_cast<std::int64_t>(message->data)) / 1e3);
-      },
-      own_group);
+      [&](Message::UniquePtr message) { latency.add(now_ns() - static_cast<std::int64_t>(message->data)); }, own_group);
   std::vector<rclcpp::TimerBase::SharedPtr> loads;
   std::vector<rclcpp::CallbackGroup::SharedPtr> groups;
   for (int i = 0; i < 2; ++i) {
@@ -332,9 +367,8 @@ Figures arrivals_loaded(rclcpp::Executor &executor, double seconds) {
   }
   executor.remove_node(node);
   waitpid(child, nullptr, 0);
-  return {{"p50_us", latency.at(0.5)},
-          {"p99_us", latency.at(0.99)},
-          {"received", static_cast<double>(latency.values.size())}};
+  const auto received = static_cast<double>(latency.size());
+  return {{"p50_us", us(latency, 0.5)}, {"p99_us", us(latency, 0.99)}, {"received", received}};
 }
 
 struct Measurement {
@@ -355,75 +389,50 @@ std::vector<Measurement> measurements() {
       {"saturation_1", [](auto &e, double s) { return saturation(e, s, 1, false); }},
       {"saturation_50", [](auto &e, double s) { return saturation(e, s, 50, false); }},
       {"saturation_50_dds", [](auto &e, double s) { return saturation(e, s, 50, true); }},
+      {"many_callbacks", [](auto &e, double s) { return many_callbacks(e, s); }},
   };
 }
 
-/// Returns true if the names, separated by commas, contain `name`; true for no names.
-bool is_listed(const std::string &name, const std::string &names) {
-  return names.empty() || ("," + names + ",").find("," + name + ",") != std::string::npos;
-}
+using Names = std::vector<std::string>;
 
-struct Options {
-  int rounds = 5;
-  double seconds = 1;
-  std::uint32_t workers = 2;
-  std::string only;
-  std::string executors;
-};
-
-std::optional<Options> parse(int argc, char **argv) {
-  Options options;
-  for (int i = 1; i < argc; i += 2) {
-    const std::string name = argv[i];
-    const char *const value = i + 1 < argc ? argv[i + 1] : nullptr;
-    if (value == nullptr) return std::nullopt;
-    if (name == "--rounds") {
-      options.rounds = std::atoi(value);
-    } else if (name == "--seconds") {
-      options.seconds = std::atof(value);
-    } else if (name == "--workers") {
-      options.workers = static_cast<std::uint32_t>(std::max(0, std::atoi(value)));
-    } else if (name == "--only") {
-      options.only = value;
-    } else if (name == "--executors") {
-      options.executors = value;
-    } else {
-      return std::nullopt;
-    }
-  }
-  if (options.rounds < 1 || options.seconds <= 0 || options.workers < 1) return std::nullopt;
-  return options;
+bool is_listed(const std::string &name, const Names &names) {
+  return names.empty() || std::find(names.begin(), names.end(), name) != names.end();
 }
 
 }  // namespace
 
 int main(int argc, char **argv) {
   if (argc == 3 && std::string(argv[1]) == "--publish") return publish_for(std::atof(argv[2]));
-  const std::optional<Options> options = parse(argc, argv);
-  if (!options) {
-    std::string names;
-    for (const Measurement &measurement : measurements()) names += (names.empty() ? "" : ",") + measurement.name;
-    std::fprintf(stderr,
-                 "usage: %s [--rounds 5] [--seconds 1] [--workers 2] [--only %s] [--executors mte,redag-none,...]\n",
-                 argv[0], names.c_str());
-    return 2;
-  }
+  int rounds = 5;
+  double seconds = 1;
+  std::uint32_t workers = 2;
+  Names only;
+  Names executors;
+  CLI::App app("Compares the latency and cost of executors, which take turns", "bench_executors");
+  Names names;
+  for (const Measurement &measurement : measurements()) names.push_back(measurement.name);
+  redag_rclcpp::lab::add_number(app, "--rounds", rounds, 1, "Rounds, of which the medians are printed");
+  redag_rclcpp::lab::add_number(app, "--seconds", seconds, 0.1, "Length of a measurement");
+  redag_rclcpp::lab::add_number(app, "--workers", workers, 1U, "Threads of each executor");
+  redag_rclcpp::lab::add_list(app, "--only", only, "These measurements; a wrong name lists all")
+      ->check(CLI::IsMember(names).description(""));
+  redag_rclcpp::lab::add_list(app, "--executors", executors, "These executors, such as mte,redag-none");
+  if (const auto status = redag_rclcpp::lab::parse_arguments(app, argc, argv)) return *status;
   rclcpp::init(0, nullptr);
   rclcpp::get_logger("redag_rclcpp").set_level(rclcpp::Logger::Level::Error);
   for (const Measurement &measurement : measurements()) {
-    if (!is_listed(measurement.name, options->only)) continue;
-    auto all = contenders(options->workers);
+    if (!is_listed(measurement.name, only)) continue;
+    auto all = contenders(workers);
     if (measurement.name == "arrivals_loaded" && all.back().name == "redag-os") {
-      all.push_back({"redag-os-not-raised", [&] {
-                       return redag_rclcpp::lab::make_redag(redag::PreemptionMode::Os, options->workers, false);
-                     }});
+      all.push_back({"redag-os-not-raised",
+                     [&] { return redag_rclcpp::lab::make_redag(redag::PreemptionMode::Os, workers, false); }});
     }
-    std::erase_if(all, [&](const Contender &kind) { return !is_listed(kind.name, options->executors); });
+    std::erase_if(all, [&](const Contender &kind) { return !is_listed(kind.name, executors); });
     std::map<std::string, std::map<std::string, std::vector<double>>> results;  // by figure, then by executor
-    for (int round = 0; round < options->rounds; ++round) {
+    for (int round = 0; round < rounds; ++round) {
       for (const Contender &kind : all) {
         const auto executor = kind.make();
-        for (const auto &[figure, value] : measurement.run(*executor, options->seconds))
+        for (const auto &[figure, value] : measurement.run(*executor, seconds))
           results[figure][kind.name].push_back(value);
       }
     }

@@ -24,8 +24,9 @@ class Samples {
   void add(redag::Duration value) { values_.push_back(value); }
   [[nodiscard]] std::size_t size() const { return values_.size(); }
 
-  /// The value in milliseconds that a share of the samples, from 0 to 1, does not exceed. Requires a sample.
+  /// The value in milliseconds that a share of the samples, from 0 to 1, does not exceed; 0 without samples.
   [[nodiscard]] double milliseconds(double share) const {
+    if (values_.empty()) return 0;
     std::vector<redag::Duration> values = values_;
     const auto n = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
     std::nth_element(values.begin(), values.begin() + n, values.end());
