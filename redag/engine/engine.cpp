@@ -176,6 +176,8 @@ void Engine::look_out() noexcept {
     }
     if (lookout_->ending()) return;
     Locked locked(*this);
+    withdraw_if_halting(locked);
+    if (placement_.take_deferred()) decide(locked, now());
     again = placement_.look(locked.wake_ups());
   }
 }
@@ -237,7 +239,7 @@ void Engine::release(std::span<const Release> releases) {
   do {
     const auto lot = releases.first(std::min(releases.size(), sched::kMostReleasesAtOnce));
     for (const Release &release : lot) scheduler_->release(release.task, release.nominal, at, release.origin);
-    decide_after_release(locked, at, sender);
+    decide_after_release(locked, at, sender, TaskId());
     releases = releases.subspan(lot.size());
   } while (!releases.empty());
 }
@@ -248,12 +250,16 @@ void Engine::release(const Release &release, Time at) {
   if (halted_at_ != kNever) return;
   const Sender sender = lookout_ ? note_release(at) : nullptr;
   scheduler_->release(release.task, release.nominal, at, release.origin);
-  decide_after_release(locked, at, sender);
+  decide_after_release(locked, at, sender, release.task);
 }
 
-// Mostly all workers have jobs, and nothing is to be done.
-[[gnu::always_inline]] inline void Engine::decide_after_release(Locked &locked, Time at, Sender sender) {
-  const sched::Step step = scheduler_->dispatch(at, most_to_start());
+// Mostly all workers have jobs, and nothing is to be done. A job of `task` that is not more urgent than that of the
+// sender can wait for the decision at the end of the latter: this spares mail, and a thread that takes it.
+[[gnu::always_inline]] inline void Engine::decide_after_release(Locked &locked, Time at, Sender sender, TaskId task) {
+  const bool can_wait = sender != nullptr && task.valid() && may_hand_over() && options_.trace_capacity == 0 &&
+                        trace::tap() == nullptr && scheduler_->level(task) >= sender->level;
+  const bool waits = can_wait && placement_.defer(at, locked.wake_ups());
+  const sched::Step step = scheduler_->dispatch(at, waits ? 0 : most_to_start());
   if (!step.events.empty() || !step.dispatches.empty() || !may_hand_over())
     carry_out(locked, step, at, nullptr, sender);
 }
@@ -265,7 +271,7 @@ void Engine::receive(const Release &message, Time at) {
   if (halted_at_ != kNever) return;
   const Sender sender = lookout_ ? note_release(at) : nullptr;
   scheduler_->receive(message.task, job == nullptr ? TaskId() : job->job.task, message.nominal, at, message.origin);
-  decide_after_release(locked, at, sender);
+  decide_after_release(locked, at, sender, message.task);
 }
 
 // Notes when the calling job first releases another. Returns its thread if it is expected to end soon and then takes a

@@ -301,7 +301,7 @@ class Engine {
   void report_limits(RunningJob &job, Duration used, Time now) REDAG_REQUIRES(lock_);
   bool tell_limits(RunningJob &job, Duration used, Time now, bool from_outside) REDAG_REQUIRES(lock_);
   void decide(Locked &locked, Time now, Taker *taker = nullptr) REDAG_REQUIRES(lock_);
-  void decide_after_release(Locked &locked, Time at, Sender sender) REDAG_REQUIRES(lock_);
+  void decide_after_release(Locked &locked, Time at, Sender sender, TaskId task) REDAG_REQUIRES(lock_);
   void carry_out(Locked &locked, const sched::Step &step, Time now, Taker *taker, Sender sender = nullptr)
       REDAG_REQUIRES(lock_);
   Sender note_release(Time at) REDAG_REQUIRES(lock_);

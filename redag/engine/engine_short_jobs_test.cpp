@@ -138,6 +138,34 @@ TEST_P(ShortJobs, WhatAJobReleasesStartsBesideItIfItGoesOn) {
   EXPECT_TRUE(seen);
 }
 
+// The same where nothing else ends a job meanwhile.
+TEST_P(ShortJobs, WhatWaitsForTheEndOfItsSenderStartsIfThatGoesOn) {
+  std::atomic<int> seen{0};
+  std::atomic<bool> goes_on{false};
+  const auto release_and_wait = [&](int ms) {
+    const int before = seen;
+    engine_->release(TaskId(1), engine_->now());
+    for (int i = 0; i < ms && seen == before; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    return seen > before;
+  };
+  const auto first = [&](const Job &) {
+    if (!goes_on) {
+      release_and_wait(0);
+      return Outcome::Finished;
+    }
+    for (int i = 0; i < 20; ++i) EXPECT_TRUE(release_and_wait(10'000));
+    return Outcome::Finished;
+  };
+  const auto second = [&](const Job &) {
+    ++seen;
+    return Outcome::Finished;
+  };
+  start({first, second}, 2);
+  run(0, kEnoughShortJobs);
+  goes_on = true;
+  run(0);
+}
+
 // Only `os` changes priorities.
 class ShortJobsWithPriorities : public ShortJobs {};
 INSTANTIATE_TEST_SUITE_P(Modes, ShortJobsWithPriorities, ::testing::Values(PreemptionMode::Os), testing::mode_name);

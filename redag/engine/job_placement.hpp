@@ -97,6 +97,8 @@ class JobPlacement {
     return true;
   }
 
+  bool defer(Time now, WakeUps &wake_ups) { return mailboxes_.defer(now, wake_ups); }
+  [[nodiscard]] bool take_deferred() { return mailboxes_.take_deferred(); }
   /// For the lookout: returns true if it should look again.
   bool look(WakeUps &wake_ups) { return mailboxes_.look(wake_ups); }
 

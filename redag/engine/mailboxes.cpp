@@ -25,14 +25,18 @@ Mailboxes::Mailboxes(std::size_t threads, Parker *lookout, bool silences_tiny_jo
 
 bool Mailboxes::may_be_silent(const TaskEntry &entry, Time now, Sender sender, WakeUps &wake_ups) {
   const bool tiny = silences_tiny_jobs_ && look_soon_ > 0 && entry.expected_tiny();
-  if (sender == nullptr && !tiny) return false;
-  if (!looks_) {
-    if (now - std::exchange(last_wake_up_, now) >= kBusy) return false;
-    looks_ = true;
-    seen_ = silent_posts_;
-    wake_ups.wake_helper(*lookout_);
-  }
+  if ((sender == nullptr && !tiny) || !may_look(now, wake_ups)) return false;
   if (sender != nullptr) look_soon(*sender);
+  return true;
+}
+
+// Returns true if the lookout is awake, or has been woken, as things are busy.
+bool Mailboxes::may_look(Time now, WakeUps &wake_ups) {
+  if (looks_) return true;
+  if (now - std::exchange(last_wake_up_, now) >= kBusy) return false;
+  looks_ = true;
+  seen_ = silent_posts_;
+  wake_ups.wake_helper(*lookout_);
   return true;
 }
 

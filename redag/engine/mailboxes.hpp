@@ -3,9 +3,9 @@
 
 // Hands jobs to threads that have none. Such a job is the thread's mail. Waking the thread takes longer than many jobs:
 // a thread that is awake and needs a job therefore steals mail. Mail need not even wake its thread while another thread
-// is about to end its job, because that one soon looks for mail. Such mail is silent: of a tiny job, while another one
-// is in progress, and of a job that a body releases shortly before its end (Sender). A thread of its own, the lookout,
-// looks every kLookInterval for mail that has waited for a whole interval, and has its thread woken.
+// soon looks for mail. Such mail is silent: of a tiny job beside another one, and of a job that a body releases shortly
+// before its end (Sender). Without a trace that job even waits for the decision at this end. The lookout, a thread of
+// its own, looks every kLookInterval for what has waited for a whole interval, and has its thread woken.
 //
 // Invariant: while mail is silent, the lookout is awake. Nothing here allocates. Not thread-safe: the engine's lock
 // guards it.
@@ -100,6 +100,15 @@ class Mailboxes {
     std::forward<Write>(write)(thread);
     deliver(thread, silent, here >= 0, wake_ups);
   }
+  /// Returns true if a job may wait for the decision at the end of a body that released it, although threads are idle.
+  bool defer(Time now, WakeUps &wake_ups) {
+    const bool any_idle = leader_ != nullptr || !idle_.empty();
+    if (!any_idle || !may_look(now, wake_ups)) return false;
+    deferred_ = ++silent_posts_;
+    return true;
+  }
+  /// Before look(): returns true, once, if a job that waits for a decision has done so since before the last look.
+  [[nodiscard]] bool take_deferred() { return deferred_ > 0 && deferred_ <= seen_ && std::exchange(deferred_, 0) > 0; }
   /// Takes the mail of a thread that is not awake yet, if that job is above `level`, or is at this level and did not
   /// wake its thread. Returns that thread, which then finds no mail and is not idle yet, or null.
   WorkerThread *steal(std::uint32_t level) { return handed_.empty() ? nullptr : steal_mail(level); }
@@ -158,6 +167,7 @@ class Mailboxes {
 
   WorkerThread *steal_mail(std::uint32_t level);
   bool may_be_silent(const TaskEntry &entry, Time now, Sender sender, WakeUps &wake_ups);
+  bool may_look(Time now, WakeUps &wake_ups);
   void look_soon(WorkerThread &thread) {
     if (!thread.looks_soon) ++look_soon_;
     thread.looks_soon = true;
@@ -175,6 +185,7 @@ class Mailboxes {
   bool looks_ = false;                  // the lookout is awake
   std::uint32_t look_soon_ = 0;         // threads with looks_soon
   std::uint64_t silent_posts_ = 0;      // since the start
+  std::uint64_t deferred_ = 0;          // the number of the last defer(), as if it were a silent post; 0: seen to
   std::uint64_t seen_ = 0;              // silent posts at the last look
   Time last_wake_up_ = -kBusy;          // the last one that mail could have done without
 };

@@ -118,6 +118,19 @@ TEST_F(MailboxesTest, WhatAJobReleasesShortlyBeforeItsEndIsLeftToItsThread) {
   EXPECT_TRUE(was_woken(other)) << "the sender has a job again";
 }
 
+TEST_F(MailboxesTest, AJobThatWaitsForADecisionIsLookedAfter) {
+  EXPECT_FALSE(mailboxes_.defer(0, wake_ups_)) << "a wake-up now and then costs little";
+  EXPECT_TRUE(mailboxes_.defer(kMicrosecond, wake_ups_));
+  EXPECT_TRUE(was_woken(lookout_));
+  EXPECT_FALSE(mailboxes_.take_deferred()) << "it has not waited for a whole interval";
+  EXPECT_TRUE(look());
+  EXPECT_TRUE(mailboxes_.take_deferred());
+  EXPECT_FALSE(mailboxes_.take_deferred());
+  EXPECT_FALSE(look());
+  for (std::uint32_t t = 0; t < 4; ++t) post(other_);
+  EXPECT_FALSE(mailboxes_.defer(kMicrosecond, wake_ups_)) << "no thread is idle";
+}
+
 TEST_F(MailboxesTest, NothingIsSilentWhileNoTinyJobRuns) {
   make_busy();
   mailboxes_.end(running_);

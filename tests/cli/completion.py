@@ -93,7 +93,7 @@ class Bash(Case):
     def test_options(self):
         for command in (["simulate"], ["analyze"], ["experiment"], ["top"]):
             long_options = {name for name in options_of(*command) if name.startswith("--")}
-            self.assertGreater(len(long_options), 4, command)
+            self.assertGreater(len(long_options), 3, command)
             self.assertEqual(set(self.complete(" ".join(command) + " --")), long_options, command)
         self.assertEqual(self.complete("simulate robot.yaml --durat"), ["--duration"])
 

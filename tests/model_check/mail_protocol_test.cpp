@@ -66,6 +66,38 @@ TEST_P(MailProtocol, SilentMailIsLookedAfter) {
   });
 }
 
+// The job was expected to end once it has released the other one, which is less urgent. Only mode none lets that one
+// wait for the decision.
+TEST_P(MailProtocol, AJobThatWaitsForTheEndOfItsSenderIsLookedAfter) {
+  expect_holds([] {
+    Scenario scenario;
+    Machine &machine = scenario.machine;
+    machine.work(1) = [&](const Job &) {
+      machine.release(0);
+      return Outcome::Finished;
+    };
+    explored::calm(true);
+    for (std::uint32_t i = 0; i < runtime::TaskEntry::kStreak; ++i) {
+      machine.release(1);
+      explored::settle();
+    }
+    explored::calm(false);
+    Countdown other(1);
+    machine.work(1) = [&](const Job &) {
+      machine.release(0);
+      other.wait();
+      return Outcome::Finished;
+    };
+    machine.work(0) = [&](const Job &) {
+      other.count();
+      return Outcome::Finished;
+    };
+    machine.release(1);
+    other.wait();
+    machine.finish_calmly();
+  });
+}
+
 // A halt while mail is silent, stolen, or looked after: the job has started and runs, or it never does.
 TEST_P(MailProtocol, AHaltFindsSilentMail) {
   expect_holds([] {
