@@ -11,9 +11,9 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <charconv>
 #include <chrono>
 #include <cstring>
-#include <filesystem>
 #include <optional>
 #include <utility>
 
@@ -26,8 +26,6 @@
 
 namespace redag::experiment {
 namespace {
-
-namespace fs = std::filesystem;
 
 Time now() { return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1); }
 
