@@ -256,8 +256,9 @@ void Engine::release(const Release &release, Time at) {
 // Mostly all workers have jobs, and nothing is to be done. A job of `task` that is not more urgent than that of the
 // sender can wait for the decision at the end of the latter: this spares mail, and a thread that takes it.
 [[gnu::always_inline]] inline void Engine::decide_after_release(Locked &locked, Time at, Sender sender, TaskId task) {
-  const bool can_wait = sender != nullptr && task.valid() && may_hand_over() && options_.trace_capacity == 0 &&
-                        trace::tap() == nullptr && scheduler_->level(task) >= sender->level;
+  const bool can_wait = sender != nullptr && task.valid() && placement_.unfinished() < options_.config.workers &&
+                        may_hand_over() && options_.trace_capacity == 0 && trace::tap() == nullptr &&
+                        scheduler_->level(task) >= sender->level;
   const bool waits = can_wait && placement_.defer(at, locked.wake_ups());
   const sched::Step step = scheduler_->dispatch(at, waits ? 0 : most_to_start());
   if (!step.events.empty() || !step.dispatches.empty() || !may_hand_over())

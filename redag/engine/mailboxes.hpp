@@ -100,10 +100,9 @@ class Mailboxes {
     std::forward<Write>(write)(thread);
     deliver(thread, silent, here >= 0, wake_ups);
   }
-  /// Returns true if a job may wait for the decision at the end of a body that released it, although threads are idle.
+  /// Returns true if a job may wait for the decision at the end of a body that released it, although a worker is free.
   bool defer(Time now, WakeUps &wake_ups) {
-    const bool any_idle = leader_ != nullptr || !idle_.empty();
-    if (!any_idle || !may_look(now, wake_ups)) return false;
+    if (!may_look(now, wake_ups)) return false;
     deferred_ = ++silent_posts_;
     return true;
   }

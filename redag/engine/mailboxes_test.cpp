@@ -127,8 +127,6 @@ TEST_F(MailboxesTest, AJobThatWaitsForADecisionIsLookedAfter) {
   EXPECT_TRUE(mailboxes_.take_deferred());
   EXPECT_FALSE(mailboxes_.take_deferred());
   EXPECT_FALSE(look());
-  for (std::uint32_t t = 0; t < 4; ++t) post(other_);
-  EXPECT_FALSE(mailboxes_.defer(kMicrosecond, wake_ups_)) << "no thread is idle";
 }
 
 TEST_F(MailboxesTest, NothingIsSilentWhileNoTinyJobRuns) {
