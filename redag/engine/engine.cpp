@@ -258,7 +258,7 @@ void Engine::release(const Release &release, Time at) {
 [[gnu::always_inline]] inline void Engine::decide_after_release(Locked &locked, Time at, Sender sender, TaskId task) {
   const bool can_wait = sender != nullptr && task.valid() && placement_.unfinished() < options_.config.workers &&
                         may_hand_over() && options_.trace_capacity == 0 && trace::tap() == nullptr &&
-                        scheduler_->level(task) >= sender->level;
+                        may_wait_for(sender, scheduler_->level(task));
   const bool waits = can_wait && placement_.defer(at, locked.wake_ups());
   const sched::Step step = scheduler_->dispatch(at, waits ? 0 : most_to_start());
   if (!step.events.empty() || !step.dispatches.empty() || !may_hand_over())

@@ -66,13 +66,11 @@ void JobPlacement::place(const sched::Step &step, const Situation &situation, Ta
     // caller would have to wait for a longer job, although another processor may be idle.
     const bool preempts = os_ && taker == nullptr && entry.expected_short();
     const int here = preempts ? processor_of(this_threads_processor()) : -1;
-    // A job more urgent than the sender's starts at once.
-    const bool may_wait = situation.sender != nullptr && situation.sender->level <= dispatch.level;
-    mailboxes_.post(entry, situation.now, here, may_wait ? situation.sender : nullptr, wake_ups,
-                    [&](WorkerThread &thread) {
-                      assign(thread, dispatch, entry, thread.mail);
-                      set_priority_for_job(thread, thread.mail);
-                    });
+    const Sender sender = may_wait_for(situation.sender, dispatch.level) ? situation.sender : nullptr;
+    mailboxes_.post(entry, situation.now, here, sender, wake_ups, [&](WorkerThread &thread) {
+      assign(thread, dispatch, entry, thread.mail);
+      set_priority_for_job(thread, thread.mail);
+    });
   }
   mailboxes_.settle(wake_ups);
 }

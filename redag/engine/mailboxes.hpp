@@ -65,6 +65,8 @@ class WakeUps {
 
 /// The thread whose job's body releases jobs, if it is expected to end soon; otherwise null.
 using Sender = WorkerThread *;
+/// True if a job of this level may wait for the end of the sender's: a more urgent one starts at once.
+inline bool may_wait_for(Sender sender, std::uint32_t level) { return sender != nullptr && sender->level <= level; }
 
 class Mailboxes {
  public:
