@@ -24,7 +24,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag/engine/preemption_point.hpp"
 #include "redag/loader/validate.hpp"
 #include "redag/sched/priority_scheduler.hpp"

@@ -10,7 +10,7 @@
 #include <variant>
 #include <vector>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag_analysis/many_workers/global_dag.hpp"
 #include "redag_analysis/many_workers/global_sequential.hpp"
 #include "redag_lab/workload/generate.hpp"

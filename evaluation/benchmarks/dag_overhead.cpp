@@ -20,8 +20,8 @@
 #include <vector>
 
 #include "evaluation/benchmarks/graphs.hpp"
+#include "redag/runtime/spins.hpp"
 #include "redag/threads/clock.hpp"
-#include "redag/threads/spins.hpp"
 
 namespace {
 

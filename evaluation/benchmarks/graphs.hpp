@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "redag/base/futex.hpp"
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag/engine/engine.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag/threads/clock.hpp"

@@ -21,7 +21,7 @@
 #include <vector>
 
 #include "redag/base/pi_mutex.hpp"
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag/sched/ready_queue.hpp"
 
 namespace {

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "redag/engine/engine.hpp"
-#include "redag/engine/release_timer.hpp"
+#include "redag/runtime/release_timer.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag/threads/clock.hpp"
 #include "redag/threads/threads.hpp"

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <vector>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag_analysis/one_worker/response_time.hpp"
 
 namespace {

@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 
 namespace redag::benchmarks {

@@ -12,7 +12,7 @@
 #include <stdexcept>
 
 #include "lqr.hpp"
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 
 namespace closed_loop {
 namespace {

@@ -63,7 +63,7 @@ struct EngineOptions {
   std::vector<int> cpus;           // processors for the worker threads; empty: any, with `os` m of them
   std::size_t trace_capacity = 0;  // events that the rings hold between two drain(); 0: no events
   ExceptionHandler on_exception;   // empty: exceptions are only counted
-  bool measure = false;            // figures() includes responses and preemptions
+  bool measure = false;            // figures() includes responses, execution times and preemptions
   MissLog *misses = nullptr;       // every miss is noted there; must outlive the engine
   // none, cooperative: how many spins a thread without a job makes before it sleeps; see spins_in().
   std::uint32_t spins = 0;
@@ -110,6 +110,7 @@ struct TaskFigures {
   // Zero or null unless EngineOptions::measure is set:
   std::uint64_t preemptions = 0;
   std::shared_ptr<const Histogram> response;    // of finished jobs, from the nominal release
+  std::shared_ptr<const Histogram> execution;   // of finished jobs, processor time
   std::shared_ptr<const Histogram> end_to_end;  // of a sink: from the earliest release whose data it carries
 };
 

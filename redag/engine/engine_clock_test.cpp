@@ -112,35 +112,6 @@ TEST_P(EngineClock, ShortJobsAskForNoProcessorTime) {
   EXPECT_EQ(asked(), before);
 }
 
-// As the callbacks of redag_rclcpp do.
-TEST_P(EngineClock, NorDoShortJobsThatCloseThemselves) {
-  static std::atomic<Duration> charged{0};
-  static std::atomic<bool> lingers{false};
-  charged = 0;
-  lingers = false;
-  start({{.name = "t", .period = 1000}}, {[](const Job &job) {
-          step_clock();
-          RunningJob &running = *RunningJob::current();
-          running.close();
-          // The first job begins on the real clock, and is not short on a busy machine.
-          if (job.number > 0) {
-            EXPECT_EQ(running.charged, running.ended - running.begun);
-          }
-          charged = running.charged;
-          if (lingers) clock_ahead += kLong;
-          return Outcome::Finished;
-        }});
-  run(0, {0}, kEnoughToBeExpectedShort);
-  const std::uint64_t asked_before = asked();
-  run(0, {0}, kMore);
-  EXPECT_EQ(asked(), asked_before);
-  // What follows is not the job's.
-  lingers = true;
-  const Duration total = engine_->figures(TaskId(0)).usage.total;
-  run(0, {0});
-  EXPECT_EQ(engine_->figures(TaskId(0)).usage.total, total + charged);
-}
-
 // A job that is charged on trust is charged more than it used. The next one must not be charged less for it.
 TEST_P(EngineClock, TrustDoesNotShortenTheNextJob) {
   static constexpr Duration kDemand = 2 * CpuMeter::kShort;
@@ -162,10 +133,9 @@ TEST_P(EngineClock, TrustDoesNotShortenTheNextJob) {
   EXPECT_GE(engine_->figures(TaskId(1)).usage.longest, kDemand);
 }
 
-TEST_P(EngineClock, JobsWithABudgetAreMeasuredThoughTheyCloseThemselves) {
+TEST_P(EngineClock, JobsWithABudgetAreMeasured) {
   start({{.name = "t", .period = 1000}}, {[](const Job &) {
           step_clock();
-          RunningJob::current()->close();
           return Outcome::Finished;
         }},
         1, kSecond);

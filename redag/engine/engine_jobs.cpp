@@ -77,7 +77,7 @@ void Engine::run(Taker &taker, Time at) noexcept {
   running.limit = assignment.entry->first_limit;
   running.measured = assignment.entry->always_measured;
   running.used_wcet_low = running.used_budget = running.reported = running.cancelled = false;
-  running.blocks = running.begins_coroutine = running.has_released = running.closed = false;
+  running.blocks = running.begins_coroutine = running.has_released = false;
   running.before = running.earlier = 0;
   running.waiting = nullptr;
   running.wait = nullptr;
@@ -91,7 +91,7 @@ void Engine::run(Taker &taker, Time at) noexcept {
   RunningJob::set_current(&running);
   running.enter();
   Outcome outcome = call(assignment, running);
-  if (!running.closed) running.end();
+  running.end();
   RunningJob::set_current(running.below);
   if (running.on_trust || !running.start.exact) {
     self.meter.pass();
@@ -130,6 +130,7 @@ inline Outcome Engine::call(const Assignment &assignment, RunningJob &running) {
   const Job &job = running.job;  // until the decision replaces it
   if (entry.response && outcome == Outcome::Finished) {
     entry.response->add(at - job.release);
+    entry.execution->add(running.charged);
     if (entry.end_to_end && entry.end_to_end != entry.response) entry.end_to_end->add(at - job.origin);
   }
   Locked locked(*this);
@@ -211,11 +212,6 @@ RunningJob::RunningJob(Engine *its_engine, WorkerThread &its_thread, const Job &
       below(current()),
       top(&its_thread.top),
       job(its_job) {}
-
-void RunningJob::close() noexcept {
-  if (!closed) end();
-  closed = true;
-}
 
 inline void RunningJob::end() noexcept {
   leave();

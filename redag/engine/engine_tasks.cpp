@@ -163,6 +163,7 @@ TaskFigures Engine::figures(TaskId task) const {
                       .late_end_to_end = entry.late_end_to_end,
                       .preemptions = entry.preemptions,
                       .response = entry.response,
+                      .execution = entry.execution,
                       .end_to_end = entry.end_to_end};
   figures.jobs.skipped -= entry.withdrawn;
   figures.jobs.aborted -= entry.cancelled;

@@ -59,12 +59,11 @@ struct RunningJob {
   bool blocks = false;            // it has lent its worker: it is in a redag::Blocking
   bool begins_coroutine = false;  // the body is in the first stretch of a coroutine
   bool has_released = false;      // its body has released a job, first at `released`
-  bool closed = false;            // close() has been called
   Time released = 0;
   WaitingJob *waiting = nullptr;    // what is kept of it between its waits; null: it has not waited
   detail::Wait *wait = nullptr;     // set by the body when it returns at a co_await; null: it has ended
   CoroutineOwner *owner = nullptr;  // set by the body where it has one: of a coroutine that it may begin
-  // Set by close():
+  // Set by end():
   Time ended = 0;         // on the engine's clock
   Duration charged = 0;   // processor time of the whole job
   bool on_trust = false;  // `charged` counts the time that the last stretch took on the clock
@@ -80,11 +79,8 @@ struct RunningJob {
   [[nodiscard]] Duration stretch_cpu_time() const noexcept;
   /// Adds what its last stretch has used to what it had used before, and begins another stretch.
   void charge(Duration stretch) noexcept;
-  /// Ends the job: sets `ended` and `charged`. A body that is about to return and needs them may call it. Otherwise the
-  /// engine does. Later calls have no effect. A job that is over within CpuMeter::kShort is charged this time on trust:
+  /// Called when its body has returned. A job that is over within CpuMeter::kShort is charged this time on trust:
   /// asking for its processor time would be a system call.
-  void close() noexcept;
-  /// As close(), for a job that has not been closed.
   void end() noexcept;
 
   /// watch() may read what the job has used between enter() and leave() only.

@@ -36,9 +36,10 @@ void TaskTable::add(TaskId id, const Task &task, const TaskRole &role, Body &bod
   entry.period = task.period;
   entry.deadline = task.deadline;
   if (role.is_sink && role.dag_deadline > 0) entry.dag_deadline = role.dag_deadline;
-  if (measure_) entry.response = std::make_shared<Histogram>();
-  if (measure_ && role.is_sink) {
-    entry.end_to_end = role.has_predecessors ? std::make_shared<Histogram>() : entry.response;
+  if (measure_) {
+    entry.response = std::make_shared<Histogram>();
+    entry.execution = std::make_shared<Histogram>();
+    if (role.is_sink) entry.end_to_end = role.has_predecessors ? std::make_shared<Histogram>() : entry.response;
   }
   entry.concurrency = task.concurrency;
   entry.is_special = logs_misses_ || entry.first_limit != kNever || entry.dag_deadline != kNever;

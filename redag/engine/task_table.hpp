@@ -87,8 +87,9 @@ struct TaskEntry {
   Usage usage;
   Duration period = 0;
   Duration deadline = 0;
-  Duration dag_deadline = kNever;       // of a sink; kNever: none
-  std::shared_ptr<Histogram> response;  // null: not measured
+  Duration dag_deadline = kNever;        // of a sink; kNever: none
+  std::shared_ptr<Histogram> response;   // null: not measured
+  std::shared_ptr<Histogram> execution;  // null: not measured
   std::shared_ptr<Histogram>
       end_to_end;           // of a sink; null: not measured. `response` itself if nothing precedes the task
   bool is_special = false;  // more is done at a job's end: limits, an end-to-end deadline, a log of misses, a removal
@@ -122,7 +123,7 @@ struct TaskEntry {
 
 class TaskTable {
  public:
-  /// measure: entries have histograms of responses.
+  /// measure: entries have histograms.
   /// logs_misses: somebody is told of every miss.
   TaskTable(bool measure, bool logs_misses) : measure_(measure), logs_misses_(logs_misses) {}
 

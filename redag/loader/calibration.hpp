@@ -13,7 +13,7 @@
 
 #include "redag/base/result.hpp"
 #include "redag/base/time.hpp"
-#include "redag/model/overheads.hpp"
+#include "redag/derived/overheads.hpp"
 
 namespace redag {
 

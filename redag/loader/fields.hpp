@@ -16,8 +16,8 @@
 #include <type_traits>
 #include <vector>
 
-#include "redag/base/cpu_list.hpp"
 #include "redag/base/time.hpp"
+#include "redag/loader/cpu_list.hpp"
 #include "redag/loader/validate.hpp"
 #include "redag/model/workload.hpp"
 

@@ -14,10 +14,10 @@
 #include <fmt/format.h>
 
 #include "redag/base/text.hpp"
+#include "redag/derived/clusters.hpp"
 #include "redag/loader/callback_match.hpp"
 #include "redag/loader/fields.hpp"
 #include "redag/loader/validate_parts.hpp"
-#include "redag/model/clusters.hpp"
 
 namespace redag {
 namespace {
@@ -418,6 +418,13 @@ Diagnostics validate(const Workload &workload, ValidateOptions options) {
 bool has_errors(const Diagnostics &diagnostics) {
   return std::any_of(diagnostics.begin(), diagnostics.end(),
                      [](const Diagnostic &diagnostic) { return diagnostic.severity == Severity::Error; });
+}
+
+Result<ValidWorkload> validated(Workload workload) {
+  Diagnostics findings = validate(workload, {.wcet_optional = true, .waits = true});
+  if (has_errors(findings)) return tl::unexpected(std::move(findings));
+  for (Dag &dag : workload.dags) inherit_periods(dag);
+  return ValidWorkload(std::move(workload));
 }
 
 }  // namespace redag

@@ -12,6 +12,7 @@
 
 #include "redag/base/ids.hpp"
 #include "redag/base/result.hpp"
+#include "redag/model/valid_workload.hpp"
 #include "redag/model/workload.hpp"
 
 namespace redag {
@@ -136,5 +137,9 @@ struct ValidateOptions {
 [[nodiscard]] Diagnostics validate(const Workload &workload, ValidateOptions options = {});
 
 [[nodiscard]] bool has_errors(const Diagnostics &diagnostics);
+
+/// Returns the workload for an executor, with the periods that data tasks inherit. Tasks with callbacks need no wcet.
+/// Error: all findings, if one of them is an error.
+[[nodiscard]] Result<ValidWorkload> validated(Workload workload);
 
 }  // namespace redag

@@ -11,10 +11,10 @@
 
 #include <fmt/format.h>
 
-#include "redag/base/cpu_list.hpp"
 #include "redag/base/text.hpp"
+#include "redag/derived/clusters.hpp"
+#include "redag/loader/cpu_list.hpp"
 #include "redag/loader/validate_parts.hpp"
-#include "redag/model/clusters.hpp"
 
 namespace redag {
 namespace {

@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 
 #include "redag/base/text.hpp"
-#include "redag/model/waits.hpp"
+#include "redag/derived/waits.hpp"
 
 namespace redag {
 namespace {

@@ -12,8 +12,8 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "redag/derived/clusters.hpp"
 #include "redag/loader/validate.hpp"
-#include "redag/model/clusters.hpp"
 #include "redag_lab/workload/generate.hpp"
 #include "tests/testing/repository.hpp"
 

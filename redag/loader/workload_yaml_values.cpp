@@ -11,8 +11,8 @@
 #include <fmt/format.h>
 
 #include "redag/base/check.hpp"
-#include "redag/base/cpu_list.hpp"
 #include "redag/base/nearest.hpp"
+#include "redag/loader/cpu_list.hpp"
 #include "redag/loader/validate.hpp"
 
 namespace redag::yaml {

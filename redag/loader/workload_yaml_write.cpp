@@ -11,7 +11,7 @@
 #include <fmt/format.h>
 
 #include "redag/base/check.hpp"
-#include "redag/base/cpu_list.hpp"
+#include "redag/loader/cpu_list.hpp"
 #include "redag/loader/fields.hpp"
 #include "redag/loader/hyperperiod_warning.hpp"
 #include "redag/loader/text_file.hpp"

@@ -12,10 +12,10 @@
 
 #include "redag/runtime/executor_impl.hpp"
 #include "redag/runtime/live_sample.hpp"
+#include "redag/runtime/spins.hpp"
 #include "redag/runtime/stop_signals.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag/threads/clock.hpp"
-#include "redag/threads/spins.hpp"
 #include "redag/threads/threads.hpp"
 
 namespace redag::runtime {

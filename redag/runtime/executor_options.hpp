@@ -23,11 +23,6 @@ namespace redag::runtime {
 
 using std::chrono::nanoseconds;
 
-struct WatchdogOptions {
-  WatchLimits limits;
-  Duration interval = 10 * kMillisecond;  // ns between two looks
-};
-
 /// An exception that left a body.
 struct ExceptionInfo {
   std::string task;  // "control.ekf"

@@ -3,8 +3,6 @@
 
 #include "redag/runtime/live_sample.hpp"
 
-#include "redag/runtime/stats.hpp"
-
 namespace redag::runtime {
 
 void fill(live::TaskSample &sample, const TaskFigures &figures) {
@@ -13,7 +11,7 @@ void fill(live::TaskSample &sample, const TaskFigures &figures) {
   sample.finished = jobs.finished;
   sample.skipped = jobs.skipped;
   sample.aborted = jobs.aborted;
-  sample.misses = misses_of(jobs, figures.late);
+  sample.misses = jobs.misses(figures.late);
   sample.deferred = jobs.deferred;
   sample.preemptions = figures.preemptions;
   sample.cpu = figures.usage.total;

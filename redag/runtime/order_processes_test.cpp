@@ -20,7 +20,7 @@
 #include <thread>
 #include <vector>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag/engine/engine.hpp"
 #include "redag/live/order_page.hpp"
 #include "redag/live/process.hpp"

@@ -38,12 +38,6 @@ class Distribution {
   std::shared_ptr<const Content> content_;  // null: empty
 };
 
-/// Deadline misses of counted jobs: those that finished late, and those that never answer. The one definition for
-/// counters; that for jobs of a record is redag_analysis/metrics/miss.hpp (docs/model.md, "What is measured").
-[[nodiscard]] inline std::uint64_t misses_of(const sched::Accounting &jobs, std::uint64_t late) {
-  return late + jobs.lost();
-}
-
 struct TaskStats {
   std::string task;  // "control.ekf"
   sched::Accounting jobs;
@@ -55,7 +49,7 @@ struct TaskStats {
   Distribution response = {};     // of finished jobs, from the release
 
   /// Jobs that finished late, were skipped, or were aborted although they had data. Jobs in flight do not count yet.
-  [[nodiscard]] std::uint64_t misses() const { return misses_of(jobs, late); }
+  [[nodiscard]] std::uint64_t misses() const { return jobs.misses(late); }
   /// The lateness (finish - deadline) that `share` of the finished jobs do not exceed; negative: they were in time. As
   /// exact as the response. 0 if `response` is empty. Throws as Distribution::quantile().
   [[nodiscard]] Duration lateness(double share) const {

@@ -11,9 +11,9 @@
 
 #include "redag/base/result.hpp"
 #include "redag/engine/engine.hpp"
-#include "redag/runtime/executor_options.hpp"
 #include "redag/threads/parker.hpp"
 #include "redag/threads/threads.hpp"
+#include "redag/threads/values.hpp"
 
 namespace redag::runtime {
 

@@ -65,6 +65,9 @@ struct Accounting {
 
   /// Jobs that never answer: skipped, or aborted although they had data.
   [[nodiscard]] std::uint64_t lost() const { return skipped + aborted - no_data; }
+  /// Deadline misses, given how many finished late. The one definition for counters; that for jobs of a record is
+  /// redag_analysis/metrics/miss.hpp (docs/model.md, "What is measured").
+  [[nodiscard]] std::uint64_t misses(std::uint64_t late) const { return late + lost(); }
   [[nodiscard]] std::uint64_t in_flight() const { return released - finished - skipped - aborted; }
   friend bool operator==(const Accounting &, const Accounting &) = default;
 };

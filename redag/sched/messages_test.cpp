@@ -7,7 +7,7 @@
 
 #include <vector>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "tests/testing/builders.hpp"
 

@@ -10,7 +10,7 @@
 
 #include <gtest/gtest.h>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 #include "tests/testing/allocation_counter.hpp"
 #include "tests/testing/builders.hpp"
 #include "tests/testing/manual_workers.hpp"

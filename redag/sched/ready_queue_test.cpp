@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 
 namespace redag::sched {
 namespace {

@@ -24,6 +24,11 @@ struct WatchLimits {
   double deadlines = 0;  // multiple of the job's relative deadline; 0: not given
 };
 
+struct WatchdogOptions {
+  WatchLimits limits;
+  Duration interval = 10 * kMillisecond;  // ns between two looks
+};
+
 /// Processor time of the ended jobs of a task.
 struct Usage {
   std::uint64_t jobs = 0;

@@ -7,7 +7,7 @@
 
 #include <limits>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag/loader/validate.hpp"
 #include "redag/trace/trace.hpp"
 

@@ -11,7 +11,7 @@
 #include <fstream>
 #include <thread>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag/loader/text_file.hpp"
 #include "redag/trace/event_codec.hpp"
 #include "redag/trace/events_file.hpp"

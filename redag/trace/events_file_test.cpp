@@ -9,7 +9,7 @@
 
 #include <filesystem>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag/loader/text_file.hpp"
 #include "redag/loader/workload_yaml.hpp"
 #include "redag/trace/run_info_json.hpp"

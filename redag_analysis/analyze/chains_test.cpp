@@ -9,7 +9,7 @@
 
 #include <fmt/format.h>
 
-#include "redag/model/waits.hpp"
+#include "redag/derived/waits.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
 #include "redag_analysis/many_workers/global_dag.hpp"

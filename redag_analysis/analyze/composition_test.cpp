@@ -8,8 +8,8 @@
 #include <map>
 #include <string>
 
+#include "redag/derived/clusters.hpp"
 #include "redag/loader/workload_yaml.hpp"
-#include "redag/model/clusters.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
 #include "redag_analysis/analyze/executors.hpp"
 #include "redag_analysis/any_features/by_demand.hpp"

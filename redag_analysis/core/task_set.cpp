@@ -10,8 +10,8 @@
 #include <set>
 #include <utility>
 
+#include "redag/derived/modes.hpp"
 #include "redag/loader/validate.hpp"
-#include "redag/model/modes.hpp"
 #include "redag/sched/policy.hpp"
 #include "redag_analysis/core/arithmetic.hpp"
 #include "redag_analysis/core/jobs_in_progress.hpp"

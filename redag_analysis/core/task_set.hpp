@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
-#include "redag/model/clusters.hpp"
-#include "redag/model/overheads.hpp"
+#include "redag/derived/clusters.hpp"
+#include "redag/derived/overheads.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/sched/config.hpp"
 

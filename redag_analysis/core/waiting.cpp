@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "redag/model/waits.hpp"
+#include "redag/derived/waits.hpp"
 #include "redag/sched/policy.hpp"
 #include "redag_analysis/core/arithmetic.hpp"
 

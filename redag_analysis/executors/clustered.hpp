@@ -14,7 +14,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "redag/model/clusters.hpp"
+#include "redag/derived/clusters.hpp"
 #include "redag/sched/scheduler.hpp"
 
 namespace redag::executors {

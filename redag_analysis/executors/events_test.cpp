@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "tests/testing/named_executor.hpp"
 #include "tests/testing/random_workloads.hpp"

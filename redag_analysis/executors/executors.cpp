@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "redag/base/check.hpp"
-#include "redag/sched/cluster_config.hpp"
+#include "redag/derived/clusters.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_analysis/executors/clustered.hpp"
 #include "redag_analysis/executors/events.hpp"
@@ -52,7 +52,7 @@ std::unique_ptr<sched::Scheduler> make_scheduler(std::string_view name, const Wo
   REDAG_CHECK(kind != nullptr, "there is no executor of this name");
   if (!workload.platform.clusters.empty()) {
     return std::make_unique<ClusteredScheduler>(workload, [&](const ClusterPart &part) {
-      return make_scheduler(name, part.workload, sched::config_of(config, part));
+      return make_scheduler(name, part.workload, config_of(config, part));
     });
   }
   const sched::Config effective = effective_config(*kind, config);

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "redag/derived/clusters.hpp"
 #include "redag/sched/scheduler.hpp"
 
 namespace redag::executors {
@@ -31,6 +32,13 @@ struct ExecutorKind {
 /// The configuration that the executor makes of `config`. A model of another executor has no preemption, levels or
 /// bound on threads, and some have one worker.
 [[nodiscard]] sched::Config effective_config(const ExecutorKind &kind, sched::Config config);
+
+/// The configuration of a cluster. `whole` is the configuration of the platform. Only the number of workers differs;
+/// `levels` and `max_started` are those of each cluster.
+[[nodiscard]] inline sched::Config config_of(sched::Config whole, const ClusterPart &part) {
+  if (part.is_cluster()) whole.workers = part.workload.platform.workers;
+  return whole;
+}
 
 /// Creates a scheduler for effective_config(), with clusters one for each of them. Requires a known name and what
 /// PriorityScheduler requires. `ranks`: see WaitSetDispatcher; not with clusters.

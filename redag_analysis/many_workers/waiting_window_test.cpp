@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 
 namespace redag::analysis::global {
 namespace {

@@ -5,14 +5,15 @@
 
 #include <algorithm>
 
-#include "redag/sched/cluster_config.hpp"
+#include "redag/derived/clusters.hpp"
+#include "redag_analysis/executors/executors.hpp"
 
 namespace redag::metrics {
 
 Activity::Activity(const Workload &workload, const sched::Config &config, Time begin)
     : begin_(begin), peaks_(workload.dags.size(), 0), busy_(config.workers, 0), busy_since_(config.workers, kNever) {
   const std::vector<ClusterPart> parts = parts_of(workload);
-  for (const ClusterPart &part : parts) parts_.emplace_back(part, sched::config_of(config, part));
+  for (const ClusterPart &part : parts) parts_.emplace_back(part, executors::config_of(config, part));
   places_ = places_in(parts);
 }
 

@@ -11,7 +11,7 @@
 #include <span>
 #include <vector>
 
-#include "redag/model/clusters.hpp"
+#include "redag/derived/clusters.hpp"
 #include "redag_analysis/metrics/replay.hpp"
 
 namespace redag::metrics {

@@ -11,9 +11,9 @@
 #include <fmt/format.h>
 
 #include "redag/base/text.hpp"
-#include "redag/base/words.hpp"
 #include "redag_analysis/metrics/jobs.hpp"
 #include "redag_analysis/metrics/summary.hpp"
+#include "redag_analysis/text/words.hpp"
 
 namespace redag::metrics {
 namespace {

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "redag/model/overheads.hpp"
+#include "redag/derived/overheads.hpp"
 #include "redag/trace/recording.hpp"
 #include "redag/trace/trace.hpp"
 #include "redag_analysis/metrics/duration_sketch.hpp"

@@ -9,7 +9,7 @@
 
 #include <filesystem>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/check/trace_checker.hpp"

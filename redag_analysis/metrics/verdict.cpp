@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 
 #include "redag/base/text.hpp"
-#include "redag/base/words.hpp"
+#include "redag_analysis/text/words.hpp"
 
 namespace redag::metrics {
 namespace {

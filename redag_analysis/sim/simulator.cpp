@@ -10,9 +10,9 @@
 
 #include "redag/base/check.hpp"
 #include "redag/base/int128.hpp"
-#include "redag/model/demand.hpp"
-#include "redag/model/release_queue.hpp"
-#include "redag/model/waits.hpp"
+#include "redag/derived/demand.hpp"
+#include "redag/derived/release_queue.hpp"
+#include "redag/derived/waits.hpp"
 #include "redag_analysis/sim/release_tree.hpp"
 
 namespace redag::sim {

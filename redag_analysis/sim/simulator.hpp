@@ -10,8 +10,8 @@
 #include <optional>
 #include <span>
 
+#include "redag/derived/overheads.hpp"
 #include "redag/model/job_event.hpp"
-#include "redag/model/overheads.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/sched/scheduler.hpp"
 
@@ -31,9 +31,9 @@ struct Overheads {
 
 struct Options {
   Duration horizon = kSecond;  // releases happen in [0, horizon); jobs unfinished at the horizon are in flight
-  std::uint64_t seed = 1;      // of execution times and jitter (redag/model/demand.hpp)
+  std::uint64_t seed = 1;      // of execution times and jitter (redag/derived/demand.hpp)
   Overheads overheads;
-  /// Execution time of a job, before overheads; default: execution_time() of redag/model/demand.hpp.
+  /// Execution time of a job, before overheads; default: execution_time() of redag/derived/demand.hpp.
   std::function<Duration(const Task &, TaskId, std::uint32_t number)> demand;
   /// Length of a wait; default: wait_time().
   std::function<Duration(const Task &, TaskId, std::uint32_t number, std::size_t wait)> wait;

@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
+#include "redag/derived/overheads.hpp"
 #include "redag/model/job_event.hpp"
-#include "redag/model/overheads.hpp"
 #include "redag/model/workload.hpp"
 
 namespace redag::doctor {

@@ -15,8 +15,8 @@
 #include <fstream>
 #include <system_error>
 
-#include "redag/base/cpu_list.hpp"
 #include "redag/base/text.hpp"
+#include "redag/loader/cpu_list.hpp"
 
 namespace redag::doctor {
 namespace {

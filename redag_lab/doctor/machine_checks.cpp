@@ -16,10 +16,10 @@
 #include <utility>
 #include <vector>
 
-#include "redag/base/cpu_list.hpp"
 #include "redag/base/text.hpp"
 #include "redag/base/time.hpp"
-#include "redag/base/words.hpp"
+#include "redag/loader/cpu_list.hpp"
+#include "redag_analysis/text/words.hpp"
 #include "redag_lab/doctor/checks.hpp"
 
 namespace redag::doctor {

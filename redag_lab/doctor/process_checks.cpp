@@ -12,12 +12,12 @@
 #include <vector>
 
 #include "redag/base/text.hpp"
-#include "redag/base/words.hpp"
 #include "redag/live/middleware_names.hpp"
 #include "redag/live/owned_file.hpp"
 #include "redag/live/reader.hpp"
 #include "redag/threads/setup.hpp"
 #include "redag/threads/threads.hpp"
+#include "redag_analysis/text/words.hpp"
 #include "redag_lab/doctor/checks.hpp"
 
 namespace redag::doctor {

@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 
 #include "redag/base/check.hpp"
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag/loader/workload_yaml.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_analysis/analyze/analyze.hpp"

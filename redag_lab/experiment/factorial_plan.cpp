@@ -9,9 +9,9 @@
 
 #include <fmt/format.h>
 
+#include "redag/derived/clusters.hpp"
 #include "redag/loader/validate.hpp"
 #include "redag/loader/workload_yaml.hpp"
-#include "redag/model/clusters.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_lab/experiment/factorial.hpp"
 #include "redag_lab/experiment/plan_reader.hpp"

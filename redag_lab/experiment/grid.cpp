@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 
 namespace redag::experiment {
 

@@ -8,7 +8,7 @@
 
 #include <numeric>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 
 namespace redag::experiment {
 namespace {

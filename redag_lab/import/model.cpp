@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "redag/base/text.hpp"
-#include "redag/base/words.hpp"
 #include "redag/loader/workload_yaml.hpp"
+#include "redag_analysis/text/words.hpp"
 #include "redag_analysis/text/wrap.hpp"
 #include "redag_lab/import/units.hpp"
 

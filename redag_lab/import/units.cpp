@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "redag/base/text.hpp"
-#include "redag/base/words.hpp"
+#include "redag_analysis/text/words.hpp"
 
 namespace redag::lab {
 

@@ -7,8 +7,8 @@
 
 #include <algorithm>
 
-#include "redag/base/words.hpp"
 #include "redag_analysis/metrics/assumptions.hpp"
+#include "redag_analysis/text/words.hpp"
 #include "redag_lab/search/analysed.hpp"
 
 namespace redag::report {

@@ -12,11 +12,11 @@
 
 #include "redag/base/check.hpp"
 #include "redag/base/text.hpp"
-#include "redag/base/words.hpp"
 #include "redag/trace/run_info_json.hpp"
 #include "redag/version.hpp"
 #include "redag_analysis/metrics/files/summary_json.hpp"
 #include "redag_analysis/metrics/miss.hpp"
+#include "redag_analysis/text/words.hpp"
 #include "redag_lab/report/verdict.hpp"
 
 namespace redag::report {

@@ -9,7 +9,7 @@
 
 #include "redag/base/check.hpp"
 #include "redag/base/text.hpp"
-#include "redag/base/words.hpp"
+#include "redag_analysis/text/words.hpp"
 
 namespace redag::report {
 namespace {

@@ -10,7 +10,7 @@
 #include <functional>
 #include <vector>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 #include "tests/testing/random_workloads.hpp"
 
 namespace redag::robot {

@@ -17,8 +17,8 @@
 #include <utility>
 #include <vector>
 
-#include "redag/base/cpu_list.hpp"
 #include "redag/base/text.hpp"
+#include "redag/loader/cpu_list.hpp"
 #include "redag/loader/workload_yaml_node.hpp"
 #include "redag/loader/workload_yaml_values.hpp"
 

@@ -9,10 +9,10 @@
 #include <utility>
 #include <vector>
 
-#include "redag/base/words.hpp"
 #include "redag/loader/validate.hpp"
 #include "redag/sched/policy.hpp"
 #include "redag/threads/setup.hpp"
+#include "redag_analysis/text/words.hpp"
 #include "redag_lab/robot/reservation.hpp"
 
 namespace redag::robot {

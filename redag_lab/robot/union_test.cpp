@@ -10,7 +10,7 @@
 #include <algorithm>
 #include <string>
 
-#include "redag/model/modes.hpp"
+#include "redag/derived/modes.hpp"
 #include "redag/sched/policy.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
 #include "redag_lab/search/analysed.hpp"

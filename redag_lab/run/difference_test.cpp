@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/sim/simulator.hpp"
 #include "tests/testing/builders.hpp"

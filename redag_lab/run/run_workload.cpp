@@ -9,16 +9,16 @@
 #include <thread>
 #include <utility>
 
-#include "redag/base/cpu_list.hpp"
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/mutex.hpp"
-#include "redag/engine/release_timer.hpp"
+#include "redag/derived/clusters.hpp"
+#include "redag/derived/waits.hpp"
+#include "redag/loader/cpu_list.hpp"
 #include "redag/loader/validate.hpp"
-#include "redag/model/clusters.hpp"
-#include "redag/model/waits.hpp"
 #include "redag/runtime/live_sample.hpp"
+#include "redag/runtime/release_timer.hpp"
+#include "redag/runtime/spins.hpp"
 #include "redag/threads/clock.hpp"
-#include "redag/threads/spins.hpp"
 #include "redag/threads/threads.hpp"
 #include "redag/trace/this_machine.hpp"
 #include "redag_analysis/executors/executors.hpp"

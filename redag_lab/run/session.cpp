@@ -11,7 +11,7 @@
 #include <memory>
 #include <span>
 
-#include "redag/model/modes.hpp"
+#include "redag/derived/modes.hpp"
 #include "redag/threads/threads.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/check/trace_checker.hpp"

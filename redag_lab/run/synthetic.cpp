@@ -8,10 +8,10 @@
 #include <thread>
 
 #include "redag/base/relax.hpp"
+#include "redag/derived/demand.hpp"
+#include "redag/derived/waits.hpp"
 #include "redag/engine/coroutine_body.hpp"
 #include "redag/engine/preemption_point.hpp"
-#include "redag/model/demand.hpp"
-#include "redag/model/waits.hpp"
 #include "redag/runtime/device_handle.hpp"
 #include "redag/threads/clock.hpp"
 

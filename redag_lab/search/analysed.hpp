@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "redag/model/clusters.hpp"
+#include "redag/derived/clusters.hpp"
 #include "redag/model/workload.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
 #include "redag_analysis/analyze/executors.hpp"

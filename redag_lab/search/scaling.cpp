@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "redag/base/check.hpp"
-#include "redag/model/waits.hpp"
+#include "redag/derived/waits.hpp"
 #include "redag_analysis/core/arithmetic.hpp"
 
 namespace redag::lab {

@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "redag/base/result.hpp"
-#include "redag/model/overheads.hpp"
+#include "redag/derived/overheads.hpp"
 #include "redag_lab/search/score.hpp"
 #include "redag_lab/search/setting.hpp"
 

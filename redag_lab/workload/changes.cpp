@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "redag/base/cpu_list.hpp"
+#include "redag/loader/cpu_list.hpp"
 
 namespace redag::lab {
 namespace {

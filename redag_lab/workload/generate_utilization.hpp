@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 
 namespace redag::lab {
 

@@ -18,7 +18,7 @@
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/mutex.hpp"
 #include "redag/base/pi_mutex.hpp"
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag/engine/preemption_point.hpp"
 #include "redag/runtime/blocking.hpp"
 #include "redag/runtime/executor.hpp"

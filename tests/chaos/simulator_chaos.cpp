@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag/loader/validate.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/check/trace_checker.hpp"

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "redag/base/check.hpp"
-#include "redag/base/cpu_list.hpp"
 #include "redag/base/time.hpp"
 #include "redag/loader/callback_match.hpp"
+#include "redag/loader/cpu_list.hpp"
 #include "tests/fuzz/targets.hpp"
 
 namespace redag::fuzz {

@@ -5,8 +5,8 @@
 #include <array>
 
 #include "protocol.hpp"
-#include "redag/engine/release_timer.hpp"
 #include "redag/runtime/executor.hpp"
+#include "redag/runtime/release_timer.hpp"
 #include "redag/threads/release_thread.hpp"
 #include "tests/testing/builders.hpp"
 

@@ -13,7 +13,7 @@
 
 #include <fmt/format.h>
 
-#include "redag/model/waits.hpp"
+#include "redag/derived/waits.hpp"
 #include "redag_analysis/analyze/executors.hpp"
 #include "redag_analysis/metrics/deadline_watch.hpp"
 #include "redag_analysis/sim/simulator.hpp"

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag/model/workload.hpp"
 #include "redag_analysis/core/bound.hpp"
 

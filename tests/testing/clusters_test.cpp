@@ -10,11 +10,10 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/clusters.hpp"
+#include "redag/derived/demand.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag/loader/validate.hpp"
-#include "redag/model/clusters.hpp"
-#include "redag/model/demand.hpp"
-#include "redag/sched/cluster_config.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/check/trace_checker.hpp"

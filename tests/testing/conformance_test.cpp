@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag/sched/policy.hpp"
 #include "redag/threads/setup.hpp"
 #include "redag_analysis/metrics/check/trace_checker.hpp"

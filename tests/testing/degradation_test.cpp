@@ -14,7 +14,7 @@
 
 #include <gtest/gtest.h>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag/sched/degradation.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "tests/testing/builders.hpp"

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "redag/base/check.hpp"
-#include "redag/base/rng.hpp"
-#include "redag/model/demand.hpp"
+#include "redag/derived/demand.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_lab/run/run_workload.hpp"
 #include "tests/testing/timeline.hpp"

@@ -17,11 +17,12 @@
 
 #include <fmt/format.h>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/clusters.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag/loader/validate.hpp"
 #include "redag/model/workload.hpp"
-#include "redag/sched/cluster_config.hpp"
 #include "redag_analysis/executors/clustered.hpp"
+#include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/check/trace_checker.hpp"
 #include "redag_analysis/metrics/deadline_watch.hpp"
 #include "redag_lab/search/analysed.hpp"
@@ -70,7 +71,11 @@ class DemandBefore {
       for (const analysis::DeviceUse &use : task.devices) time += use.service;
       return rate_of(task) * static_cast<double>(time);
     };
-    if (sum(all, executes) >= set_.platform.workers || sum(is_own, holds) >= own_.at_once) return false;
+    // A cooperative job that has begun, and does not run to its end, can lie under others while a worker is free.
+    const bool is_bound_to_one =
+        set_.mode == sched::Preemption::Cooperative && (own_.region < own_.wcet - own_.waits || own_.wake_ups > 0);
+    const std::uint32_t workers = is_bound_to_one ? 1 : set_.platform.workers;
+    if (sum(all, executes) >= workers || sum(is_own, holds) >= own_.at_once) return false;
     if (own_.group != analysis::kNoGroup && sum(shares_group, holds) >= 1) return false;
     if (cap > 0 && sum(shares_dag, holds) >= cap) return false;
     for (std::size_t d = 0; d < own_.devices.size(); ++d) {
@@ -157,7 +162,7 @@ void add_claims(const RandomRun &run, const analysis::AnalysisPlatform &platform
       tighten(claims.dags[one.part.dags[d].value], report.dags[d].response);
     }
     if (std::any_of(report.tasks.begin(), report.tasks.end(), [](const auto &task) { return task.response; })) {
-      claims.bounded.push_back(features_of(one.part.workload, sched::config_of(run.config, one.part)));
+      claims.bounded.push_back(features_of(one.part.workload, executors::config_of(run.config, one.part)));
       if (run.workload.platform.clusters.size() > 1)
         claims.bounded.back().set(static_cast<std::size_t>(Feature::Clusters));
     }
@@ -263,7 +268,7 @@ std::vector<metrics::JobRecord> jobs_by_reference(const trace::RunInfo &info, si
   std::unique_ptr<sched::Scheduler> scheduler = std::make_unique<ReferenceScheduler>(info.workload, info.config);
   if (!info.workload.platform.clusters.empty()) {
     scheduler = std::make_unique<executors::ClusteredScheduler>(info.workload, [&](const ClusterPart &part) {
-      return std::make_unique<ReferenceScheduler>(part.workload, sched::config_of(info.config, part));
+      return std::make_unique<ReferenceScheduler>(part.workload, executors::config_of(info.config, part));
     });
   }
   options.horizon = info.end;

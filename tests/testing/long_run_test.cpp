@@ -14,7 +14,7 @@
 
 #include <fmt/format.h>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/deadline_watch.hpp"

@@ -10,7 +10,7 @@
 
 #include <gtest/gtest.h>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag_analysis/analyze/analyze.hpp"
 #include "redag_analysis/metrics/jobs.hpp"

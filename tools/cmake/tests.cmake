@@ -5,7 +5,7 @@
 # <group>.<name>, with the group as label (`ctest -L '^sched$'`). Included by the repository's CMakeLists.txt.
 set(base redag/base)
 set(live redag/live)
-set(model redag/model redag/loader)
+set(model redag/model redag/derived redag/loader)
 set(sched redag/sched)
 set(trace redag/trace)
 set(runtime redag/threads redag/engine redag/runtime)

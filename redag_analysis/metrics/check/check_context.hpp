@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "redag/model/demand.hpp"
+#include "redag/derived/demand.hpp"
 #include "redag/trace/trace.hpp"
 #include "redag_analysis/metrics/check/check_report.hpp"
 #include "redag_analysis/metrics/replay.hpp"

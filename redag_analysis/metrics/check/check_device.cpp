@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "redag/model/waits.hpp"
+#include "redag/derived/waits.hpp"
 
 namespace redag::metrics {
 

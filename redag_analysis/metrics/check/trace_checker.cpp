@@ -8,8 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "redag/model/clusters.hpp"
-#include "redag/sched/cluster_config.hpp"
+#include "redag/derived/clusters.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/check/check_context.hpp"
 #include "redag_analysis/metrics/check/check_device.hpp"
@@ -178,7 +177,7 @@ class TraceChecker::Impl {
     for (std::uint32_t p = 0; p < parts_.size(); ++p) {
       trace::RunInfo info = run;
       info.workload = parts_[p].workload;
-      info.config = sched::config_of(info.config, parts_[p]);
+      info.config = executors::config_of(info.config, parts_[p]);
       info.event_tasks.clear();
       for (const TaskId task : run.event_tasks) {
         if (places_[task.value].part == p) info.event_tasks.push_back(places_[task.value].task);

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "redag/model/clusters.hpp"
+#include "redag/derived/clusters.hpp"
 #include "redag_analysis/metrics/deadline_watch.hpp"
 #include "redag_analysis/metrics/perfetto/perfetto_packets.hpp"
 

@@ -10,7 +10,7 @@
 
 #include <stdexcept>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag_analysis/metrics/why/why.hpp"
 #include "redag_analysis/metrics/why/why_remedy.hpp"
 #include "redag_analysis/metrics/why/why_text.hpp"

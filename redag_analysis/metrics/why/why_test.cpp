@@ -11,8 +11,8 @@
 #include <map>
 #include <numeric>
 
-#include "redag/base/rng.hpp"
-#include "redag/model/demand.hpp"
+#include "redag/derived/demand.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/why/why_text.hpp"
 #include "tests/testing/builders.hpp"

@@ -6,8 +6,8 @@
 #include <fmt/format.h>
 
 #include "redag/base/text.hpp"
-#include "redag/base/words.hpp"
 #include "redag/trace/trace.hpp"
+#include "redag_analysis/text/words.hpp"
 
 namespace redag::metrics {
 namespace {

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "redag/model/clusters.hpp"
-#include "redag/sched/cluster_config.hpp"
+#include "redag/derived/clusters.hpp"
+#include "redag_analysis/executors/executors.hpp"
 #include "redag_analysis/metrics/check/trace_checker.hpp"
 #include "redag_analysis/metrics/replay.hpp"
 
@@ -31,7 +31,7 @@ class ClusterWaits {
   ClusterWaits(const ClusterPart &part, const trace::RunInfo &info)
       : rules_(rules_for(info)),
         part_(as_followed(part, rules_)),
-        config_(sched::config_of(info.config, part_)),
+        config_(executors::config_of(info.config, part_)),
         replay_(part_.workload, config_) {}
 
   /// Adds the time until `time` to the stretches of all followed jobs.

@@ -9,10 +9,10 @@
 #include <cmath>
 
 #include "redag/base/text.hpp"
-#include "redag/base/words.hpp"
 #include "redag/trace/trace.hpp"
 #include "redag_analysis/text/rounded_time.hpp"
 #include "redag_analysis/text/table.hpp"
+#include "redag_analysis/text/words.hpp"
 #include "redag_lab/search/remedy.hpp"
 
 namespace redag::cli {

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "redag/base/cpu_list.hpp"
 #include "redag/base/text.hpp"
+#include "redag/loader/cpu_list.hpp"
 #include "redag_analysis/text/table.hpp"
 #include "redag_lab/cli/analyze/analysis_arguments.hpp"
 #include "redag_lab/cli/analyze/analysis_chains.hpp"

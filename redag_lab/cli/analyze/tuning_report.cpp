@@ -10,8 +10,8 @@
 #include <span>
 
 #include "redag/base/text.hpp"
-#include "redag/base/words.hpp"
 #include "redag_analysis/text/table.hpp"
+#include "redag_analysis/text/words.hpp"
 #include "redag_lab/workload/changes.hpp"
 
 namespace redag::cli {

@@ -15,11 +15,11 @@
 #include <utility>
 #include <vector>
 
-#include "redag/base/cpu_list.hpp"
 #include "redag/base/text.hpp"
-#include "redag/base/words.hpp"
+#include "redag/loader/cpu_list.hpp"
 #include "redag_analysis/text/table.hpp"
 #include "redag_analysis/text/tint.hpp"
+#include "redag_analysis/text/words.hpp"
 #include "redag_analysis/text/wrap.hpp"
 
 namespace redag::cli {

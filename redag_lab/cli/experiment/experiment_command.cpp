@@ -11,8 +11,8 @@
 
 #include "redag/base/check.hpp"
 #include "redag/base/text.hpp"
-#include "redag/base/words.hpp"
 #include "redag/trace/this_machine.hpp"
+#include "redag_analysis/text/words.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/files.hpp"
 #include "redag_lab/cli/terminal/options.hpp"

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "redag/base/text.hpp"
-#include "redag/base/words.hpp"
 #include "redag/loader/provenance.hpp"
 #include "redag/loader/validate.hpp"
+#include "redag_analysis/text/words.hpp"
 #include "redag_lab/cli/import/verdict_report.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/files.hpp"

@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "redag/base/text.hpp"
-#include "redag/base/words.hpp"
 #include "redag_analysis/text/table.hpp"
 #include "redag_analysis/text/tint.hpp"
+#include "redag_analysis/text/words.hpp"
 
 namespace redag::cli {
 namespace {

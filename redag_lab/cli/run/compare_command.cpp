@@ -11,7 +11,7 @@
 #include <system_error>
 
 #include "redag/base/text.hpp"
-#include "redag/model/waits.hpp"
+#include "redag/derived/waits.hpp"
 #include "redag_lab/cli/run/compare_recorded.hpp"
 #include "redag_lab/cli/run/comparison_report.hpp"
 #include "redag_lab/cli/run/run_arguments.hpp"

@@ -8,8 +8,8 @@
 #include <algorithm>
 
 #include "redag/base/text.hpp"
-#include "redag/base/words.hpp"
 #include "redag_analysis/text/table.hpp"
+#include "redag_analysis/text/words.hpp"
 
 namespace redag::cli {
 namespace {

@@ -9,9 +9,9 @@
 #include <array>
 
 #include "redag/base/text.hpp"
-#include "redag/base/words.hpp"
 #include "redag/trace/trace.hpp"
 #include "redag_analysis/text/table.hpp"
+#include "redag_analysis/text/words.hpp"
 
 namespace redag::cli {
 namespace {

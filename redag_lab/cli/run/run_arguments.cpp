@@ -7,14 +7,14 @@
 
 #include <algorithm>
 
-#include "redag/base/cpu_list.hpp"
 #include "redag/base/text.hpp"
+#include "redag/derived/clusters.hpp"
+#include "redag/derived/modes.hpp"
+#include "redag/loader/cpu_list.hpp"
 #include "redag/loader/provenance.hpp"
 #include "redag/loader/validate.hpp"
 #include "redag/loader/workload_yaml.hpp"
 #include "redag/loader/workload_yaml_edit.hpp"
-#include "redag/model/clusters.hpp"
-#include "redag/model/modes.hpp"
 #include "redag/threads/threads.hpp"
 #include "redag/trace/trace.hpp"
 #include "redag_analysis/executors/executors.hpp"

@@ -11,10 +11,10 @@
 #include <utility>
 
 #include "redag/base/text.hpp"
-#include "redag/base/words.hpp"
 #include "redag_analysis/metrics/files/summary_json.hpp"
 #include "redag_analysis/metrics/verdict.hpp"
 #include "redag_analysis/text/table.hpp"
+#include "redag_analysis/text/words.hpp"
 #include "redag_lab/cli/run/bound_report.hpp"
 
 namespace redag::cli {

@@ -7,10 +7,10 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "redag/base/words.hpp"
 #include "redag/loader/hyperperiod_warning.hpp"
 #include "redag_analysis/sim/simulator.hpp"
 #include "redag_analysis/text/tint.hpp"
+#include "redag_analysis/text/words.hpp"
 #include "redag_lab/cli/terminal/commands.hpp"
 #include "redag_lab/cli/terminal/files.hpp"
 #include "redag_lab/cli/terminal/json.hpp"

@@ -9,10 +9,10 @@
 #include <optional>
 
 #include "redag/base/text.hpp"
-#include "redag/base/words.hpp"
 #include "redag_analysis/metrics/why/why_remedy.hpp"
 #include "redag_analysis/metrics/why/why_text.hpp"
 #include "redag_analysis/text/table.hpp"
+#include "redag_analysis/text/words.hpp"
 #include "redag_analysis/text/wrap.hpp"
 
 namespace redag::cli {

@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "redag/base/text.hpp"
-#include "redag/base/words.hpp"
 #include "redag/live/rates.hpp"
+#include "redag_analysis/text/words.hpp"
 
 namespace redag::cli {
 namespace {

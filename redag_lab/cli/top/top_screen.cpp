@@ -11,8 +11,8 @@
 #include <utility>
 
 #include "redag/base/text.hpp"
-#include "redag/base/words.hpp"
 #include "redag/live/rates.hpp"
+#include "redag_analysis/text/words.hpp"
 #include "redag_lab/cli/top/live_table.hpp"
 
 namespace redag::cli {

@@ -13,7 +13,6 @@
 
 #include "engine_setup.hpp"
 #include "rclcpp/logging.hpp"
-#include "redag/runtime/live_sample.hpp"
 #include "redag/threads/clock.hpp"
 #include "redag/threads/threads.hpp"
 
@@ -40,7 +39,7 @@ bool locks_inherit() {
 
 ReDAGExecutor::Core::Core(const rclcpp::Context::SharedPtr &context, ReDAGOptions options)
     : context_(context),
-      options_(prepare(std::move(options))),
+      options_(checked(std::move(options))),
       setup_(set_up(options_)),
       origin_(monotonic_now()),
       engine_(make_engine(options_, setup_, origin_,
@@ -49,8 +48,8 @@ ReDAGExecutor::Core::Core(const rclcpp::Context::SharedPtr &context, ReDAGOption
       bridge_(context),
       tasks_(
           redag::Platform{
-              .workers = setup_.config.workers, .preemption = setup_.mode.mode, .devices = options_.devices},
-          setup_.config.policy, setup_.config.ties, options_.workload ? &*options_.workload : nullptr),
+              .workers = setup_.config.workers, .preemption = setup_.mode.mode, .devices = devices_of(options_)},
+          setup_.config.policy, setup_.config.ties, options_.workload ? &**options_.workload : nullptr),
       registry_(context, options_, setup_.config.workers,
                 {.engine = *engine_, .timer = timer_, .bridge = bridge_, .tasks = tasks_, .notes = notes_}),
       learning_(registry_, options_.learn.count()),
@@ -58,23 +57,6 @@ ReDAGExecutor::Core::Core(const rclcpp::Context::SharedPtr &context, ReDAGOption
   engine_->share_releases(timer_.thread());
   for (std::string &warning : setup_.warnings) notes_.warn(std::move(warning));
   setup_.warnings.clear();
-  if (options_.live) go_live();
-}
-
-void ReDAGExecutor::Core::go_live() {
-  const std::string name = options_.workload ? options_.workload->name : "";
-  auto publisher = redag::live::Publisher::start(
-      redag::runtime::live_options(name.empty() ? "ros" : name, "ros", setup_.mode, setup_.config),
-      [this](redag::live::Sample &sample) {
-        tasks_.sample(*engine_, notes_.live_bounds(), sample);
-        sample.alert = notes_.alert();
-        if (sample.alert.empty()) sample.alert = redag::runtime::alert_of(*engine_);
-      });
-  if (publisher) {
-    live_ = *std::move(publisher);
-  } else {
-    notes_.warn(to_string(publisher.error()));
-  }
 }
 
 ReDAGExecutor::Core::~Core() = default;
@@ -90,7 +72,6 @@ void ReDAGExecutor::Core::open(ExecutorHooks hooks, const std::vector<const rclc
 
 void ReDAGExecutor::Core::close() {
   (void)context_->remove_on_shutdown_callback(shutdown_);
-  live_.reset();
   timer_.stop();
   engine_->halt();
   if (watchdog_) (void)engine_->wait_idle(kNever);  // the watchdog still reports a job that delays this
@@ -134,13 +115,12 @@ void ReDAGExecutor::Core::let_wait() {
 }
 
 redag::runtime::DeviceHandle ReDAGExecutor::Core::device(const std::string &name) const {
-  for (std::size_t d = 0; d < options_.devices.size(); ++d) {
-    if (options_.devices[d].name == name) return {*engine_, redag::DeviceId(d)};
+  const std::vector<redag::Device> devices = devices_of(options_);
+  for (std::size_t d = 0; d < devices.size(); ++d) {
+    if (devices[d].name == name) return {*engine_, redag::DeviceId(d)};
   }
   throw std::out_of_range(fmt::format(
-      "redag_rclcpp::device(): the executor has no device '{}' (add it to ReDAGOptions::devices, or to the platform of "
-      "the workload file)",
-      name));
+      "redag_rclcpp::device(): the executor has no device '{}' (add it to the platform of the workload file)", name));
 }
 
 void ReDAGExecutor::Core::wait_set_changed() {

@@ -22,7 +22,6 @@
 #include "learning.hpp"
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/pi_mutex.hpp"
-#include "redag/live/publisher.hpp"
 #include "redag/runtime/watchdog.hpp"
 #include "redag/threads/parker.hpp"
 #include "redag/threads/setup.hpp"
@@ -75,7 +74,6 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
   [[nodiscard]] std::vector<std::string> errors() const;
   [[nodiscard]] std::vector<Deadlock> deadlocks() const { return notes_.deadlocks(); }
   [[nodiscard]] bool learning_done() const { return learning_.done(); }
-  void set_live_bounds(std::map<std::string, redag::Duration> bounds) { notes_.set_live_bounds(std::move(bounds)); }
   [[nodiscard]] redag::trace::RunInfo run_info(std::vector<std::uint32_t> &positions) const;
 
   // Functions of ExecutorContext.
@@ -95,7 +93,6 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
   [[nodiscard]] redag::runtime::DeviceHandle device(const std::string &name) const override;
 
  private:
-  void go_live();
   void start();
   void watch_jobs();
   void report_unmatched();
@@ -143,8 +140,6 @@ class ReDAGExecutor::Core final : public ExecutorContext, public std::enable_sha
   std::exception_ptr wait_set_failure_;     // exception of watch_wait_set(), read after its end
 
   std::unique_ptr<redag::runtime::Watchdog> watchdog_;  // set once the engine has threads
-
-  std::unique_ptr<redag::live::Publisher> live_;  // last member: it reads figures until it is destroyed
 };
 
 }  // namespace redag_rclcpp

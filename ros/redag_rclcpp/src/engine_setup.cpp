@@ -8,7 +8,6 @@
 #include <string>
 #include <utility>
 
-#include "redag/loader/validate.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag/threads/threads.hpp"
 
@@ -16,26 +15,25 @@ namespace redag_rclcpp {
 
 using std::chrono::nanoseconds;
 
-ReDAGOptions prepare(ReDAGOptions options) {
+ReDAGOptions checked(ReDAGOptions options) {
   if (options.default_period <= nanoseconds(0)) {
     throw std::invalid_argument(
         "default_period must be greater than 0, because callbacks with shorter periods are more urgent");
   }
   if (options.watchdog < nanoseconds(0)) throw std::invalid_argument("watchdog must not be negative");
-  if (const std::string why = redag::device_mistake(options.devices); !why.empty()) {
-    throw std::invalid_argument("ReDAGOptions::devices: " + why);
-  }
-  if (!options.workload) return options;
-  const auto findings = redag::validate(*options.workload, redag::ValidateOptions{.wcet_optional = true});
-  if (has_errors(findings)) throw std::runtime_error(to_string(findings));
-  for (redag::Dag &dag : options.workload->dags) redag::inherit_periods(dag);
   return options;
 }
 
+std::vector<redag::Device> devices_of(const ReDAGOptions &options) {
+  return options.workload ? (*options.workload)->platform.devices : std::vector<redag::Device>();
+}
+
 redag::runtime::Setup set_up(const ReDAGOptions &options) {
+  const redag::Workload plain;
+  const redag::Workload &workload = options.workload ? **options.workload : plain;
   auto setup = redag::runtime::set_up({.preemption = options.preemption,
-                                       .policy = options.workload ? options.workload->policy : redag::Workload().policy,
-                                       .ties = options.workload ? options.workload->ties : redag::Workload().ties,
+                                       .policy = workload.policy,
+                                       .ties = workload.ties,
                                        .workers = options.workers,
                                        .threads = options.threads,
                                        .cpus = options.cpus});
@@ -55,11 +53,11 @@ std::unique_ptr<redag::runtime::Engine> make_engine(
   engine_options.cpus = options.cpus;
   engine_options.spare_threads = setup.spare_threads;
   engine_options.trace_capacity = options.trace_capacity;
-  engine_options.measure = options.live;
+  engine_options.measure = true;
   engine_options.waits_priority = setup.timer_priority();
   engine_options.on_exception = std::move(on_exception);
   redag::Workload empty;
-  empty.platform.devices = options.devices;
+  empty.platform.devices = devices_of(options);
   auto scheduler = std::make_unique<redag::sched::PriorityScheduler>(empty, engine_options.config);
   auto engine = std::make_unique<redag::runtime::Engine>(std::move(scheduler), std::move(engine_options));
   engine->set_origin(origin);

@@ -7,6 +7,7 @@
 
 #include <functional>
 #include <memory>
+#include <vector>
 
 #include "redag/engine/engine.hpp"
 #include "redag/threads/setup.hpp"
@@ -14,9 +15,11 @@
 
 namespace redag_rclcpp {
 
-/// Checks the options, and completes the workload. Throws std::runtime_error if the workload is invalid,
-/// std::invalid_argument for other options.
-[[nodiscard]] ReDAGOptions prepare(ReDAGOptions options);
+/// Returns the options. Throws std::invalid_argument for numbers out of range.
+[[nodiscard]] ReDAGOptions checked(ReDAGOptions options);
+
+/// Those of the workload's platform.
+[[nodiscard]] std::vector<redag::Device> devices_of(const ReDAGOptions &options);
 
 /// Throws std::runtime_error if the machine does not offer what the options ask for.
 [[nodiscard]] redag::runtime::Setup set_up(const ReDAGOptions &options);

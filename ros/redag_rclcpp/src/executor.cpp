@@ -186,10 +186,11 @@ std::uint32_t ReDAGExecutor::workers() const { return core_->setup().config.work
 std::vector<std::string> ReDAGExecutor::warnings() const { return core_->warnings(); }
 std::vector<std::string> ReDAGExecutor::errors() const { return core_->errors(); }
 std::vector<Deadlock> ReDAGExecutor::deadlocks() const { return core_->deadlocks(); }
-std::vector<CallbackStats> ReDAGExecutor::stats() const { return core_->tasks().stats(core_->engine()); }
-void ReDAGExecutor::set_live_bounds(std::map<std::string, redag::Duration> bounds) {
-  core_->set_live_bounds(std::move(bounds));
+std::vector<CallbackStats> ReDAGExecutor::stats(bool percentiles) const {
+  return core_->tasks().stats(core_->engine(), percentiles);
 }
+const std::vector<redag::Dag> &ReDAGExecutor::dags() const { return core_->tasks().dags(); }
+const redag::runtime::Engine &ReDAGExecutor::engine() const { return core_->engine(); }
 redag::Workload ReDAGExecutor::learned() const { return core_->tasks().learned(); }
 bool ReDAGExecutor::learning_done() const { return core_->learning_done(); }
 std::uint64_t ReDAGExecutor::lost_events() const { return core_->engine().lost_events(); }

@@ -13,7 +13,6 @@
 
 #include "compat.hpp"
 #include "rclcpp/logging.hpp"
-#include "redag/loader/validate.hpp"
 
 namespace redag_rclcpp {
 
@@ -24,7 +23,7 @@ Registry::Registry(rclcpp::Context::SharedPtr context, const ReDAGOptions &optio
                    const Parts &parts)
     : context_(std::move(context)), options_(options), workers_(workers), parts_(parts) {
   for (const redag::Dag &dag : parts_.tasks.dags()) dag_ids_.push_back(parts_.engine.add_dag(dag, {}).dag);
-  if (options_.workload) matcher_ = std::make_unique<redag::CallbackMatcher>(*options_.workload);
+  if (options_.workload) matcher_ = std::make_unique<redag::CallbackMatcher>(**options_.workload);
 }
 
 void Registry::open(const std::shared_ptr<ExecutorContext> &executor, Groups groups) {
@@ -294,6 +293,7 @@ void Registry::add(std::vector<Found> found, Added &added) {
   const std::vector<redag::TaskId> ids = parts_.engine.add_tasks(std::move(tasks));
   for (std::size_t i = 0; i < ids.size(); ++i) {
     const std::shared_ptr<Callback> callback = entries[i].callback;
+    entries[i].execution = parts_.engine.figures(ids[i]).execution;
     parts_.tasks.set(ids[i], std::move(entries[i]));
     callbacks_[found[i].entity->key] = {callback, found[i].entity->group.get()};
     added.push_back(callback);
@@ -309,7 +309,7 @@ void Registry::place(TaskTable::Entry &entry, const Entity &found) {
     task = *ref->task;
     entry.dag = ref->dag.value;
     entry.position = ref->index;
-    entry.rank = redag::topological_ranks(options_.workload->dags[entry.dag])[ref->index];
+    entry.rank = redag::topological_ranks((*options_.workload)->dags[entry.dag])[ref->index];
     entry.configured = true;
   }
   if (task.period == 0) task.period = entry.id.period > 0 ? entry.id.period : options_.default_period.count();
@@ -319,6 +319,7 @@ void Registry::place(TaskTable::Entry &entry, const Entity &found) {
   // ROS decides what releases the jobs, and which jobs must not overlap. connect() states the predecessors.
   task.activation = redag::Activation::Timer;
   task.predecessors.clear();
+  task.waits.clear();  // what its body waits for counts
   task.offset = 0;
   task.jitter = 0;
   task.overrun = redag::Overrun::Skip;
@@ -360,11 +361,11 @@ void Registry::find_places(const std::vector<Entity> &found) {
   }
 }
 
-const Task &Registry::task_at(Place place) const { return options_.workload->dags[place.first].tasks[place.second]; }
+const Task &Registry::task_at(Place place) const { return (*options_.workload)->dags[place.first].tasks[place.second]; }
 
 const std::vector<std::uint32_t> &Registry::predecessors_of(Place place) const {
   static const std::vector<std::uint32_t> none;
-  const bool executed = options_.workload->dags[place.first].edges == redag::Edges::Executed;
+  const bool executed = (*options_.workload)->dags[place.first].edges == redag::Edges::Executed;
   return executed ? task_at(place).predecessors : none;
 }
 
@@ -422,7 +423,7 @@ redag::Time Registry::look_at_edges(redag::Time now) {
 }
 
 std::string Registry::name_at(Place place) const {
-  return options_.workload->dags[place.first].name + "." + task_at(place).name;
+  return (*options_.workload)->dags[place.first].name + "." + task_at(place).name;
 }
 
 void Registry::warn(std::string text) {

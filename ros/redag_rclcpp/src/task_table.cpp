@@ -9,10 +9,6 @@
 #include <cstdlib>
 #include <set>
 
-#include "redag/loader/validate.hpp"
-#include "redag/runtime/live_sample.hpp"
-#include "redag/runtime/stats.hpp"
-
 namespace redag_rclcpp {
 namespace {
 
@@ -100,6 +96,7 @@ void TaskTable::drop(TaskId task) {
   std::shared_ptr<Callback> gone;  // declared before the guard: destroyed without the lock
   const redag::LockGuard guard(lock_);
   gone.swap(entries_[task.value].callback);
+  entries_[task.value].execution.reset();
 }
 
 std::string TaskTable::name_of(TaskId task) const {
@@ -160,7 +157,7 @@ std::vector<Endpoint> TaskTable::endpoints() const {
   return result;
 }
 
-std::vector<CallbackStats> TaskTable::stats(const redag::runtime::Engine &engine) const {
+std::vector<CallbackStats> TaskTable::stats(const redag::runtime::Engine &engine, bool percentiles) const {
   struct Row {
     TaskId task;
     std::shared_ptr<Callback> callback;
@@ -174,6 +171,7 @@ std::vector<CallbackStats> TaskTable::stats(const redag::runtime::Engine &engine
       if (!entry.callback) continue;
       CallbackStats stats;
       stats.id = entry.id;
+      stats.key = TaskId(i);
       if (entry.configured) stats.dag = dags_[entry.dag].name;
       stats.task = name(entry);
       stats.period = entry.task.period;
@@ -188,13 +186,15 @@ std::vector<CallbackStats> TaskTable::stats(const redag::runtime::Engine &engine
     const redag::runtime::TaskFigures figures = engine.figures(row.task);
     stats.jobs = figures.jobs;
     stats.waits = figures.most_waits;
-    stats.misses = redag::runtime::misses_of(stats.jobs, callback.late());
-    stats.response_p50 = callback.response().quantile(0.5);
-    stats.response_p99 = callback.response().quantile(0.99);
-    stats.response_max = callback.response().longest();
-    stats.execution_p50 = callback.execution().quantile(0.5);
-    stats.execution_p99 = callback.execution().quantile(0.99);
-    stats.execution_max = callback.execution().longest();
+    stats.misses = stats.jobs.misses(figures.late + callback.lost());
+    stats.publishers = callback.publishers();
+    stats.response_max = figures.response->longest();
+    stats.execution_max = figures.execution->longest();
+    if (!percentiles) continue;
+    stats.response_p50 = figures.response->quantile(0.5);
+    stats.response_p99 = figures.response->quantile(0.99);
+    stats.execution_p50 = figures.execution->quantile(0.5);
+    stats.execution_p99 = figures.execution->quantile(0.99);
   }
   std::vector<CallbackStats> result;
   {
@@ -207,59 +207,6 @@ std::vector<CallbackStats> TaskTable::stats(const redag::runtime::Engine &engine
   std::stable_sort(result.begin(), result.end(),
                    [](const CallbackStats &a, const CallbackStats &b) { return a.period < b.period; });
   return result;
-}
-
-void TaskTable::sample(const redag::runtime::Engine &engine, const std::map<std::string, redag::Duration> &bounds,
-                       redag::live::Sample &sample) const {
-  for (const redag::Dag &dag : dags_) sample.dags.push_back({dag.name, dag.max_active, dag.deadline});
-  redag::runtime::add_threads(sample, engine);
-  redag::runtime::add_devices(sample, engine);
-  struct Row {
-    std::shared_ptr<Callback> callback;
-    redag::live::TaskSample task;
-  };
-  std::vector<Row> rows;
-  {
-    const redag::LockGuard guard(lock_);
-    for (std::size_t i = 0; i < entries_.size(); ++i) {
-      const Entry &entry = entries_[i];
-      if (!entry.callback) continue;
-      redag::live::TaskSample task;
-      task.key = i;
-      task.name = entry.configured ? entry.task.name : to_string(entry.id);
-      task.dag = entry.dag;
-      task.period = entry.task.period;
-      task.deadline = entry.task.deadline;
-      const auto bound = entry.configured ? bounds.find(name(entry)) : bounds.end();
-      if (bound != bounds.end()) task.bound = bound->second;
-      rows.push_back(Row{entry.callback, std::move(task)});
-    }
-  }
-  for (Row &row : rows) {
-    const redag::runtime::TaskFigures figures = engine.figures(TaskId(row.task.key));
-    redag::runtime::fill(row.task, figures);
-    row.task.misses = redag::runtime::misses_of(figures.jobs, row.callback->late());
-  }
-  // A task whose messages another task of its DAG takes does not answer for the DAG.
-  std::map<std::uint64_t, std::uint32_t> dag_of;
-  std::set<std::uint64_t> followed;
-  for (const Row &row : rows) dag_of.emplace(row.task.key, row.task.dag);
-  for (const Row &row : rows) {
-    for (const TaskId publisher : row.callback->publishers()) {
-      const auto found = dag_of.find(publisher.value);
-      if (found != dag_of.end() && found->second == row.task.dag && publisher.value != row.task.key) {
-        followed.insert(publisher.value);
-      }
-    }
-  }
-  for (Row &row : rows) {
-    if (followed.count(row.task.key) > 0) row.task.end_to_end.reset();
-  }
-  // As in stats(): skips callbacks that have gone meanwhile.
-  const redag::LockGuard guard(lock_);
-  for (Row &row : rows) {
-    if (entries_[row.task.key].callback == row.callback) sample.tasks.push_back(std::move(row.task));
-  }
 }
 
 // ---- learned rates and edges ----
@@ -346,7 +293,7 @@ Workload TaskTable::as_workload(Ids &ids, bool live) const {
       task.name = wanted;
       for (int n = 2; !names.insert(dag.name + "." + task.name).second; ++n)
         task.name = fmt::format("{}_{}", wanted, n);
-      if (entry.callback) task.wcet = std::max(task.wcet, entry.callback->execution().longest());
+      if (entry.execution) task.wcet = std::max(task.wcet, entry.execution->longest());
       if (!live) task.wcet = std::clamp<redag::Duration>(task.wcet, 1, task.deadline);
       task.bcet = std::min(task.bcet, task.wcet);
       task.execution = {};
@@ -402,7 +349,7 @@ void TaskTable::add_seen_edges(Workload &workload, const Ids &ids) const {
   }
 }
 
-// Adds the edges that the file states, between tasks that exist.
+// Adds the edges that the file states, between tasks that exist, and the waits.
 void TaskTable::add_configured_edges(redag::Dag &dag, std::size_t task, const Entry &entry) const {
   const std::vector<Task> &configured = configured_->dags[entry.dag].tasks;
   const auto named = [](const std::vector<Task> &tasks, const std::string &name) {
@@ -415,6 +362,7 @@ void TaskTable::add_configured_edges(redag::Dag &dag, std::size_t task, const En
     dag.tasks[task].predecessors.push_back(static_cast<std::uint32_t>(found - dag.tasks.begin()));
   }
   if (!dag.tasks[task].predecessors.empty()) dag.tasks[task].activation = same->activation;
+  dag.tasks[task].waits = same->waits;
 }
 
 Workload TaskTable::describe(std::vector<std::uint32_t> &positions) const {

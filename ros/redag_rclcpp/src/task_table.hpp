@@ -16,7 +16,6 @@
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/pi_mutex.hpp"
 #include "redag/engine/engine.hpp"
-#include "redag/live/frame_builder.hpp"
 #include "redag/loader/callback_match.hpp"
 #include "redag/model/workload.hpp"
 #include "redag/trace/trace.hpp"
@@ -32,12 +31,13 @@ class TaskTable {
     std::shared_ptr<Callback> callback;  // null once dropped
     redag::CallbackId id;
     redag::Task task;
-    std::uint32_t dag = 0;          // position in dags()
-    std::uint32_t rank = 0;         // topological rank within its DAG
-    bool configured = false;        // named by the workload
-    std::uint32_t position = 0;     // if so: among the tasks of its DAG there
-    bool in_default_group = false;  // of its node
-    bool learned = false;           // its period is not the one it began with
+    std::shared_ptr<const redag::Histogram> execution;  // of its jobs, processor time; null once dropped
+    std::uint32_t dag = 0;                              // position in dags()
+    std::uint32_t rank = 0;                             // topological rank within its DAG
+    bool configured = false;                            // named by the workload
+    std::uint32_t position = 0;                         // if so: among the tasks of its DAG there
+    bool in_default_group = false;                      // of its node
+    bool learned = false;                               // its period is not the one it began with
   };
 
   /// `platform`, `policy` and `ties` are the executor's. `configured` is the user's workload, or null.
@@ -64,12 +64,8 @@ class TaskTable {
   /// The clients, and the servers with inputs that were not taken.
   [[nodiscard]] std::vector<Endpoint> endpoints() const;
 
-  /// Figures of all callbacks, shortest period first.
-  [[nodiscard]] std::vector<CallbackStats> stats(const redag::runtime::Engine &engine) const;
-
-  /// Appends DAGs and figures for the live page. `bounds`: on response times, by task name.
-  void sample(const redag::runtime::Engine &engine, const std::map<std::string, redag::Duration> &bounds,
-              redag::live::Sample &sample) const;
+  /// See ReDAGExecutor::stats().
+  [[nodiscard]] std::vector<CallbackStats> stats(const redag::runtime::Engine &engine, bool percentiles) const;
 
   /// Gives callbacks without a stated rate the rate that was learned. Returns the changed tasks and their new period,
   /// which is also their deadline.

@@ -20,7 +20,7 @@
 #include "rclcpp/rclcpp.hpp"
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/pi_mutex.hpp"
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag/engine/preemption_point.hpp"
 #include "redag_rclcpp/executor.hpp"
 #include "rosgraph_msgs/msg/clock.hpp"

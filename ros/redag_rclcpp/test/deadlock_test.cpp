@@ -329,7 +329,7 @@ TEST_P(DeadlockTest, AnActionServerInTheGroupOfItsCaller) {
 }
 
 TEST_P(DeadlockTest, ADagWhosePlacesAreTaken) {
-  options.workload = parse(R"(
+  options.workload = valid(R"(
 name: test
 dags:
   - name: d
@@ -467,7 +467,6 @@ TEST_P(DeadlockLog, HasOneErrorAndTheEnd) {
 }
 
 TEST_P(DeadlockLog, IsInTheMetricsOnTheLivePageAndInTheTrace) {
-  options.live = true;
   make_executors(2);
   serve_elsewhere("/map");
   const auto client = create_client(node, "/map", nullptr);

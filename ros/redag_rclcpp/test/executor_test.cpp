@@ -19,6 +19,7 @@
 #include <utility>
 #include <vector>
 
+#include "live_page.hpp"
 #include "mode_test.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "redag/engine/preemption_point.hpp"
@@ -53,7 +54,7 @@ dags:
 )";
 
 TEST_P(ExecutorTest, RunsTheHighestRateFirst) {
-  options.workload = parse(kThreeRates);
+  options.workload = valid(kThreeRates);
   ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
   std::vector<std::string> order;
   auto slow = subscribe("/slow", [&] { order.push_back("slow"); });
@@ -135,7 +136,7 @@ TEST_P(EqualRatesTest, ACircleIsNotOlderThanItsEquals) {
 }
 
 TEST_P(ExecutorTest, WorkersTakeTheHighestRateFirst) {
-  options.workload = parse(kThreeRates);
+  options.workload = valid(kThreeRates);
   ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
   std::mutex mutex;
   std::vector<std::string> order;
@@ -170,7 +171,7 @@ TEST_P(ExecutorTest, WorkersTakeTheHighestRateFirst) {
 
 TEST_P(ExecutorTest, MaxActiveBoundsADag) {
   options.workers = 3;
-  options.workload = parse(R"(
+  options.workload = valid(R"(
 name: bounded
 dags:
   - name: perception
@@ -205,8 +206,7 @@ dags:
 }
 
 TEST_P(ExecutorTest, IsSeenLive) {
-  options.live = true;
-  options.workload = parse(R"(
+  options.workload = valid(R"(
 name: seen
 dags:
   - name: control
@@ -216,16 +216,17 @@ dags:
   const std::string path = redag::live::page_path(redag::live::kFolder, ::getpid(), 0);
   {
     ReDAGExecutor executor(rclcpp::ExecutorOptions(), options);
-    executor.set_live_bounds({{"control.tick", 3 * redag::kMillisecond}});
+    LivePage page(executor);
+    page.set_bounds({{"control.tick", 3 * redag::kMillisecond}});
     auto timer = node->create_wall_timer(10ms, [] {});
     auto never = node->create_wall_timer(std::chrono::hours(24 * 365 * 150), [] {});  // more than a page can hold
     executor.add_node(node);
     Spinner spinner(executor);
     std::optional<redag::live::Frame> frame;
     EXPECT_TRUE(eventually([&] {
-      const auto page = redag::live::read_page(path);
-      if (!page || page->frame.tasks.empty() || page->frame.tasks[0].figures.finished == 0) return false;
-      frame = page->frame;
+      const auto read = redag::live::read_page(path);
+      if (!read || read->frame.tasks.empty() || read->frame.tasks[0].figures.finished == 0) return false;
+      frame = read->frame;
       return true;
     }));
     ASSERT_TRUE(frame);
@@ -237,9 +238,6 @@ dags:
     EXPECT_EQ(frame->tasks[0].bound, 3 * redag::kMillisecond);
     EXPECT_GT(frame->tasks[0].figures.response_max, 0);
   }
-  EXPECT_FALSE(redag::live::read_page(path));
-  options.live = false;
-  const ReDAGExecutor hidden(rclcpp::ExecutorOptions(), options);
   EXPECT_FALSE(redag::live::read_page(path));
 }
 
@@ -564,7 +562,7 @@ TEST_P(ExecutorTest, LearnsRatesAndEdges) {
   EXPECT_EQ(dag.tasks[position("/c")].activation, redag::Activation::Data);
   EXPECT_GT(dag.tasks[position("/c")].wcet, 0);
   // The learned workload can be given to the next run, and names the same callbacks.
-  options.workload = learned;
+  options.workload = redag::validated(learned).value();
   options.learn = 0ms;
   ReDAGExecutor again(rclcpp::ExecutorOptions(), options);
   executor.remove_node(node);
@@ -690,7 +688,7 @@ TEST_P(ExecutorTest, LearnsARateOnceWhereOthersSubscribeToo) {
 TEST_P(ExecutorTest, ItsTraceHoldsToTheModel) {
   options.workers = 2;
   options.trace_capacity = 1 << 16;
-  options.workload = parse(R"(
+  options.workload = valid(R"(
 name: traced
 dags:
   - name: chain

@@ -190,7 +190,7 @@ TEST(JoinWithPredecessors, BeginsWhenAllHaveCompleted) {
         groups[2]);
     ReDAGOptions options;
     options.workers = 3;
-    options.workload = parse(R"(
+    options.workload = valid(R"(
 name: join
 platform: {workers: 3}
 dags:

@@ -64,7 +64,10 @@ class MonitorTest : public ::testing::Test {
     timers_.push_back(node_->create_wall_timer(period, std::move(body)));
   }
 
-  void configure(const char *workload) { options_.workload = monitor_options_.workload = parse(workload); }
+  void configure(const char *workload) {
+    monitor_options_.workload = parse(workload);
+    options_.workload = valid(workload);
+  }
 
   void start() {
     executor_ = std::make_unique<ReDAGExecutor>(options_);
@@ -218,7 +221,7 @@ TEST_F(MonitorTest, WhatIsSavedConfiguresTheNextRun) {
   ASSERT_TRUE(loaded) << to_string(loaded.error());
 
   ReDAGOptions next = options_;
-  next.workload = loaded->workload;
+  next.workload = redag::validated(loaded->workload).value();
   ReDAGExecutor executor(next);
   executor_->remove_node(node_);
   executor.add_node(node_);

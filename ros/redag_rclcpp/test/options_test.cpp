@@ -87,11 +87,11 @@ TEST_F(OptionsTest, Defaults) {
   EXPECT_TRUE(options.raise_middleware);
   EXPECT_FALSE(options.lock_memory);
   EXPECT_EQ(options.watchdog, 0ns);
-  EXPECT_TRUE(options.live);
   EXPECT_EQ(options.trace_capacity, 0U);
 
   const MonitorOptions monitor = declare_monitor_options(*node, options);
   EXPECT_EQ(monitor.period, 1s);
+  EXPECT_TRUE(monitor.live);
   EXPECT_EQ(monitor.trace, "");
   EXPECT_FALSE(monitor.workload);
 }
@@ -122,11 +122,11 @@ TEST_F(OptionsTest, ValuesAreRead) {
   EXPECT_FALSE(options.raise_middleware);
   EXPECT_TRUE(options.lock_memory);
   EXPECT_EQ(options.watchdog, 2s);
-  EXPECT_FALSE(options.live);
   EXPECT_GT(options.trace_capacity, 0U);
 
   const MonitorOptions monitor = declare_monitor_options(*node, options);
   EXPECT_EQ(monitor.period, 250ms);
+  EXPECT_FALSE(monitor.live);
   EXPECT_EQ(monitor.trace, "results");
   EXPECT_EQ(monitor.trace_events, 10U);
   EXPECT_EQ(monitor.save_path, "s.yaml");
@@ -144,9 +144,9 @@ TEST_F(OptionsTest, TheWorkloadCountsWhereParametersAreAtTheirDefaults) {
   EXPECT_EQ(from_file.workers, 3U);
   EXPECT_EQ(from_file.preemption, redag::PreemptionMode::None);
   ASSERT_TRUE(from_file.workload);
-  EXPECT_EQ(from_file.workload->name, "robot");
-  EXPECT_EQ(from_file.workload->policy, redag::PolicyKind::Edf);
-  EXPECT_EQ(from_file.workload->ties, redag::Ties::Fixed);
+  EXPECT_EQ((*from_file.workload)->name, "robot");
+  EXPECT_EQ((*from_file.workload)->policy, redag::PolicyKind::Edf);
+  EXPECT_EQ((*from_file.workload)->ties, redag::Ties::Fixed);
   const auto config = ReDAGExecutor(from_file).as_trace({}).info.config;
   EXPECT_EQ(config.policy, redag::PolicyKind::Edf);
   EXPECT_EQ(config.ties, redag::Ties::Fixed);

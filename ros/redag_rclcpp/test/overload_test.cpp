@@ -114,7 +114,7 @@ TEST_P(OverloadTest, OverwrittenMessagesAreCounted) {
 
 // Messages arrive between the start of a job and its take. They overwrite the message that released the job.
 TEST_P(OverloadTest, AJobTakesWhatHasOverwrittenItsMessage) {
-  options.workload = parse(kOneSubscription);
+  options.workload = valid(kOneSubscription);
   ReDAGExecutor executor(options);
   Numbers numbers(node, "/numbers", false, 3);
   executor.add_node(node);
@@ -131,7 +131,7 @@ TEST_P(OverloadTest, AJobTakesWhatHasOverwrittenItsMessage) {
 }
 
 TEST_P(OverloadTest, ASkippedMessageThatIsOverwrittenIsNotDroppedTwice) {
-  options.workload = parse(kOneSubscription);
+  options.workload = valid(kOneSubscription);
   ReDAGExecutor executor(options);
   Numbers numbers(node, "/numbers", false, 3);
   executor.add_node(node);
@@ -176,7 +176,7 @@ TEST_P(OverloadTest, AfterATakeThatThrewNothingIsLeftBehind) {
 // ---- budgets and criticality ----
 
 TEST_P(OverloadTest, AfterASkippedReleaseTheNextMessageIsTaken) {
-  options.workload = parse(kOneSubscription);
+  options.workload = valid(kOneSubscription);
   for (const bool in_process : {true, false}) {
     SCOPED_TRACE(in_process);
     ReDAGExecutor executor(options);
@@ -194,7 +194,7 @@ TEST_P(OverloadTest, AfterASkippedReleaseTheNextMessageIsTaken) {
 }
 
 TEST_P(OverloadTest, AMessageBeyondMaxPendingIsDroppedAndTheNextOneTaken) {
-  options.workload = parse(R"(
+  options.workload = valid(R"(
 name: admission
 dags:
   - name: d
@@ -231,7 +231,7 @@ dags:
 )";
 
 TEST_P(OverloadTest, HighModeDropsMessagesOfLowerCriticalityUntilItEnds) {
-  options.workload = parse(kTwoCriticalities);
+  options.workload = valid(kTwoCriticalities);
   for (const bool in_process : {true, false}) {
     SCOPED_TRACE(in_process);
     ReDAGExecutor executor(options);
@@ -252,7 +252,7 @@ TEST_P(OverloadTest, HighModeDropsMessagesOfLowerCriticalityUntilItEnds) {
 }
 
 TEST_P(OverloadTest, HighModeDelaysRequestsAndDropsNone) {
-  options.workload = parse(kTwoCriticalities);
+  options.workload = valid(kTwoCriticalities);
   ReDAGExecutor executor(options);
   Numbers control(node, "/control", true);
   control.execution = 2 * redag::kMillisecond;
@@ -274,7 +274,7 @@ TEST_P(OverloadTest, HighModeDelaysRequestsAndDropsNone) {
 }
 
 TEST_P(OverloadTest, LowerCriticalityGoesOnAfterHighModeOnWorkers) {
-  options.workload = parse(kTwoCriticalities);
+  options.workload = valid(kTwoCriticalities);
   ReDAGExecutor executor(options);
   Numbers control(node, "/control", false);
   control.execution = 2 * redag::kMillisecond;

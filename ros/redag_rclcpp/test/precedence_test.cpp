@@ -94,7 +94,7 @@ class PrecedenceTest : public ModeTest {
   }
 
   void start(const std::string &workload) {
-    options.workload = parse(workload);
+    options.workload = valid(workload);
     executor.emplace(options);
     executor->add_node(node);
     spinner = std::make_unique<Spinner<ReDAGExecutor>>(*executor);
@@ -348,7 +348,7 @@ TEST_P(PrecedenceTest, AMessageFromBeforeCostsNoLaterOne) {
   const auto camera = subscribe("start", runs.body("camera", [&] { out->publish(Empty()); }));
   const auto trigger = publisher("start");
   std::this_thread::sleep_for(50ms);
-  options.workload = parse(R"(
+  options.workload = valid(R"(
 name: latched
 platform: {workers: 2}
 dags:
@@ -580,7 +580,7 @@ TEST_P(PrecedenceTest, RandomDAGsRunInTheSimulatorsOrder) {
       ASSERT_TRUE(
           eventually([&] { return publishers[t]->get_subscription_count() == static_cast<std::size_t>(readers); }));
     }
-    options.workload = workload;
+    options.workload = redag::validated(workload).value();
     executor.emplace(options);
     for (const auto &one : nodes) executor->add_node(one);
     spinner = std::make_unique<Spinner<ReDAGExecutor>>(*executor);

@@ -21,6 +21,7 @@
 #include "message_filters/sync_policies/approximate_time.h"
 #include "message_filters/synchronizer.h"
 #include "rclcpp/rclcpp.hpp"
+#include "redag/loader/validate.hpp"
 #include "redag/loader/workload_yaml.hpp"
 #include "redag/threads/clock.hpp"
 #include "redag_rclcpp/join.hpp"
@@ -164,7 +165,7 @@ Figures measure(const StackRun &run, const StackOptions &options) {
   if (options.config != "none") {
     const auto loaded = redag::load_workload(options.config);
     if (!loaded) throw std::runtime_error(to_string(loaded.error()));
-    chosen.workload = loaded->workload;
+    chosen.workload = redag::validated(loaded->workload).value();
   }
   redag_rclcpp::ReDAGExecutor executor(chosen);
   return robot.run(executor, options.seconds);

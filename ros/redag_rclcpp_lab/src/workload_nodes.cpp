@@ -13,8 +13,8 @@
 #include <thread>
 #include <utility>
 
+#include "redag/derived/demand.hpp"
 #include "redag/engine/preemption_point.hpp"
-#include "redag/model/demand.hpp"
 #include "redag/threads/clock.hpp"
 
 namespace redag_rclcpp::lab {

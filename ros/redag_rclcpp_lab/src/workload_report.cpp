@@ -9,12 +9,12 @@
 #include <numeric>
 
 #include "redag/base/text.hpp"
-#include "redag/base/words.hpp"
 #include "redag/trace/events_file.hpp"
 #include "redag/trace/output_file.hpp"
 #include "redag_analysis/metrics/files/run_files.hpp"
 #include "redag_analysis/metrics/files/summary_json.hpp"
 #include "redag_analysis/text/table.hpp"
+#include "redag_analysis/text/words.hpp"
 #include "workload_run.hpp"
 
 namespace redag_rclcpp::lab {

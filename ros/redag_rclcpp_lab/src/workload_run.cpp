@@ -24,6 +24,7 @@
 #include "rclcpp/rclcpp.hpp"
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/mutex.hpp"
+#include "redag/loader/validate.hpp"
 #include "redag/threads/setup.hpp"
 #include "redag/threads/threads.hpp"
 #include "redag/trace/this_machine.hpp"
@@ -126,7 +127,7 @@ class Run {
       redag.preemption = preemption_of(name).value_or(workload_.platform.preemption);
       redag.threads = workers_ + kSpareThreads;
       redag.cpus = workload_.platform.cpus;
-      redag.workload = nodes_->bound_workload();
+      redag.workload = redag::validated(nodes_->bound_workload()).value();
       redag.trace_capacity = kSchedulerEvents;
       redag_ = std::make_shared<ReDAGExecutor>(redag);
       executor_ = redag_;

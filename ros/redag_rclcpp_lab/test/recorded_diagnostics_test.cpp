@@ -15,6 +15,7 @@
 #include "diagnostic_msgs/msg/diagnostic_array.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "rclcpp/serialization.hpp"
+#include "redag/loader/validate.hpp"
 #include "redag/loader/workload_yaml.hpp"
 #include "redag_rclcpp/executor.hpp"
 #include "redag_rclcpp/monitor.hpp"
@@ -69,7 +70,7 @@ TEST(RecordedDiagnostics, TellOfMisses) {
     ASSERT_TRUE(workload) << to_string(workload.error());
     ReDAGOptions options;
     options.workers = 2;
-    options.workload = workload->workload;
+    options.workload = redag::validated(workload->workload).value();
     MonitorOptions monitored;
     monitored.period = 50ms;
     monitored.workload = workload->workload;

@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "rclcpp/rclcpp.hpp"
-#include "redag/base/rng.hpp"
 #include "redag/base/time.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag_rclcpp/executor.hpp"
 #include "rosbag2_cpp/writer.hpp"
 #include "rosbag2_storage/storage_options.hpp"

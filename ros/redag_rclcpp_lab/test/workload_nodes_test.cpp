@@ -16,9 +16,9 @@
 
 #include "node_events.hpp"
 #include "peers.hpp"
+#include "redag/derived/demand.hpp"
 #include "redag/loader/callback_match.hpp"
 #include "redag/loader/workload_yaml.hpp"
-#include "redag/model/demand.hpp"
 #include "redag/threads/setup.hpp"
 #include "redag/trace/trace.hpp"
 #include "redag_analysis/metrics/check/trace_checker.hpp"

@@ -45,8 +45,6 @@ class CallbackJob {
   [[nodiscard]] bool lends_messages() const;
   /// Runs the coroutine until its first wait. The job goes on with the rest.
   static void run(redag::Coroutine coroutine);
-  /// The last action of the coroutine.
-  void end() const;
 
  private:
   std::shared_ptr<Callback> callback_;
@@ -75,10 +73,8 @@ std::decay_t<Argument> keep(const CallbackJob &job, Argument &&argument) {
 
 /// Its frame has all that the user's coroutine may refer to: the function with its captures, and the arguments.
 template <class Function, class... Arguments>
-redag::Coroutine run_callback(CallbackJob job, std::shared_ptr<Function> function,
-                              std::decay_t<Arguments>... arguments) {
+redag::Coroutine run_callback(std::shared_ptr<Function> function, std::decay_t<Arguments>... arguments) {
   co_await (*function)(static_cast<Arguments &&>(arguments)...);
-  job.end();
 }
 
 template <class Function, class... Arguments>
@@ -87,8 +83,7 @@ std::function<void(Arguments...)> make_callback(std::shared_ptr<Function> functi
                 "redag_rclcpp::coroutine() takes a function that returns redag::Coroutine");
   return [function](Arguments... arguments) {
     const CallbackJob job;
-    CallbackJob::run(
-        run_callback<Function, Arguments...>(job, function, keep(job, std::forward<Arguments>(arguments))...));
+    CallbackJob::run(run_callback<Function, Arguments...>(function, keep(job, std::forward<Arguments>(arguments))...));
   };
 }
 

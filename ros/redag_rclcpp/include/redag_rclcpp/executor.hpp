@@ -15,7 +15,6 @@
 #include <cstdint>
 #include <exception>
 #include <functional>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -24,7 +23,7 @@
 #include "rclcpp/executor.hpp"
 #include "redag/engine/engine.hpp"
 #include "redag/loader/callback_match.hpp"
-#include "redag/model/workload.hpp"
+#include "redag/model/valid_workload.hpp"
 #include "redag/threads/setup.hpp"
 #include "redag/trace/trace.hpp"
 #include "redag_rclcpp/distribution.hpp"
@@ -48,12 +47,12 @@ struct ReDAGOptions {
   /// Callbacks that can be started and unfinished at once. With none and cooperative, those beyond `workers` are in a
   /// redag::Blocking, without a worker. 0: with os workers + 16, otherwise as many as workers.
   std::uint32_t threads = 0;
-  std::vector<int> cpus{};               // processors for the workers; empty: os takes `workers` of the usable ones
-  std::vector<redag::Device> devices{};  // accelerators for redag_rclcpp::device() (coroutine.hpp)
+  std::vector<int> cpus{};  // processors for the workers; empty: os takes `workers` of the usable ones
 
-  /// States which callback is which task of which DAG (docs/workload_format.md, `callback`). Its policy and ties
-  /// decide the order. The executor does not read its platform; declare_options() does.
-  std::optional<redag::Workload> workload{};
+  /// States which callback is which task of which DAG (docs/workload_format.md, `callback`). Its policy and ties decide
+  /// the order. Of its platform, the executor takes the devices alone, for redag_rclcpp::device() (coroutine.hpp).
+  /// declare_options() takes the rest. Made by redag::validated().
+  std::optional<redag::ValidWorkload> workload{};
   /// Period of a callback whose period neither the workload nor a timer states. It decides the callback's priority
   /// until a rate is learned. Must be above 0.
   std::chrono::nanoseconds default_period = std::chrono::milliseconds(100);
@@ -71,7 +70,6 @@ struct ReDAGOptions {
   /// watchdog, `on_budget` and HI mode also take effect in callbacks without preemption points.
   std::chrono::nanoseconds watchdog{};
   std::size_t trace_capacity = 0;  // events that the rings hold between two drain_trace(); 0: no events
-  bool live = false;  // shows the executor in `redag top`: a page of shared memory, and a thread that updates it
   /// Called on the thread that executed the callback; must not throw. Empty: Stop.
   std::function<OnException(const ExceptionInfo &)> on_exception{};
 };
@@ -79,6 +77,7 @@ struct ReDAGOptions {
 /// Figures of one callback since it was added.
 struct CallbackStats {
   redag::CallbackId id;
+  redag::TaskId key;           // of its events in the trace, and of engine()'s figures, while it exists
   std::string dag;             // "" if the workload does not name it
   std::string task;            // "control.ekf", or to_string(id)
   redag::Duration period = 0;  // decides its priority; stated by a timer or the workload, learned, or the default
@@ -92,7 +91,8 @@ struct CallbackStats {
   redag::Duration execution_p50 = 0;  // processor time
   redag::Duration execution_p99 = 0;
   redag::Duration execution_max = 0;
-  std::uint32_t waits = 0;  // the most co_awaits of one job
+  std::uint32_t waits = 0;                // the most co_awaits of one job
+  std::vector<redag::TaskId> publishers;  // keys of the callbacks that published the messages which arrived here
 };
 
 /// A callback that waited for a response which could not reach it.
@@ -110,8 +110,7 @@ class ReDAGExecutor : public rclcpp::Executor {
  public:
   RCLCPP_SMART_PTR_DEFINITIONS(ReDAGExecutor)
 
-  /// Throws std::runtime_error if preemption `os` is requested and not available (the text says how to get it), or if
-  /// the workload is not valid.
+  /// Throws std::runtime_error if preemption `os` is requested and not available. The text says how to get it.
   explicit ReDAGExecutor(const rclcpp::ExecutorOptions &options = rclcpp::ExecutorOptions(),
                          ReDAGOptions redag_options = ReDAGOptions());
   explicit ReDAGExecutor(ReDAGOptions redag_options);
@@ -155,11 +154,14 @@ class ReDAGExecutor : public rclcpp::Executor {
   /// the order of their beginning; the last 100. The log names each.
   [[nodiscard]] std::vector<Deadlock> deadlocks() const;
 
-  /// Live figures of all callbacks, shortest period first. Cheap enough to call once a second.
-  [[nodiscard]] std::vector<CallbackStats> stats() const;
+  /// Live figures of all callbacks, shortest period first. Cheap enough to call once a second. Without percentiles,
+  /// which stay 0, it is several times as cheap.
+  [[nodiscard]] std::vector<CallbackStats> stats(bool percentiles = true) const;
 
-  /// Gives `redag top` the proven bounds on response times to show, by CallbackStats::task.
-  void set_live_bounds(std::map<std::string, redag::Duration> bounds);
+  /// The workload's DAGs without their tasks. The last one, "ros", is for callbacks that the workload does not name.
+  [[nodiscard]] const std::vector<redag::Dag> &dags() const;
+  /// For observers: figures of threads and devices, and jobs in progress.
+  [[nodiscard]] const redag::runtime::Engine &engine() const;
 
   /// The callbacks as a workload, with the learned periods, edges and execution times (`wcet`: the longest seen).
   /// `redag analyze` accepts it once every callback has run.

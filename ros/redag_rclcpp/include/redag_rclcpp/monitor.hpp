@@ -25,6 +25,7 @@ namespace redag_rclcpp {
 
 struct MonitorOptions {
   std::chrono::nanoseconds period = std::chrono::seconds(1);  // between two published snapshots; 0: only on request
+  bool live = true;  // shows the executor in `redag top`: a page of shared memory, and a thread that updates it
 
   /// Folder for events.redag, jobs.csv, summary.json, trace.pftrace and metrics.json; created if missing. "": no files.
   /// Needs ReDAGOptions::trace_capacity.
@@ -47,7 +48,7 @@ struct MonitorOptions {
   std::optional<redag::Calibration> calibration{};
 };
 
-/// Declares and reads the parameters of a monitor whose executor gets `executor`: metrics_period, save_path,
+/// Declares and reads the parameters of a monitor whose executor gets `executor`: metrics_period, live, save_path,
 /// trace, trace_events, bounds, overheads. See options.hpp.
 [[nodiscard]] MonitorOptions declare_monitor_options(rclcpp::Node &node, const ReDAGOptions &executor);
 

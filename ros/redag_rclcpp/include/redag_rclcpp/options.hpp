@@ -12,8 +12,8 @@
 namespace redag_rclcpp {
 
 /// Declares (unless declared already) and reads these parameters: workers, preemption, threads, cpu_affinity,
-/// config, default_period, learn, raise_middleware, lock_memory, watchdog, live, trace, bounds. They are read-only from
-/// then on.
+/// config, default_period, learn, raise_middleware, lock_memory, watchdog, trace, bounds. They are read-only from then
+/// on.
 ///
 /// `config` names a workload file. The file's policy decides the order. Its platform counts where the parameter
 /// has its default. Throws

@@ -52,8 +52,6 @@ void CallbackJob::run(redag::Coroutine coroutine) {
   redag::runtime::run_in_job(std::move(coroutine), running.owner);
 }
 
-void CallbackJob::end() const { callback_->coroutine_ended(); }
-
 // The client is held only while this runs. Where it is gone, so is what the caller would do with the response.
 redag::Coroutine CallBase::run() {
   const std::shared_ptr<AwaitedCalls> calls = AwaitedCalls::of(existing(client_));

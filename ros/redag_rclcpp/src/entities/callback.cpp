@@ -7,26 +7,14 @@
 #include <utility>
 
 #include "redag/engine/running_job.hpp"
-#include "redag/engine/waiting_jobs.hpp"
 
 namespace redag_rclcpp {
 
 using redag::sched::Outcome;
 
 Outcome Callback::execute(const redag::runtime::Job &job) {
-  redag::runtime::RunningJob &running = *redag::runtime::RunningJob::current();
-  running.owner = this;
-  if (!run(job.release)) return Outcome::NoData;
-  if (running.waiting == nullptr) count_job(running, job.release);
-  return Outcome::Finished;
-}
-
-void Callback::count_job(redag::runtime::RunningJob &running, Time release) {
-  running.close();
-  const Duration response = running.ended - release;
-  response_.add(response);
-  if (response > deadline()) count_late();
-  execution_.add(running.charged);
+  redag::runtime::RunningJob::current()->owner = this;
+  return run(job.release) ? Outcome::Finished : Outcome::NoData;
 }
 
 std::shared_ptr<ExecutorContext> Callback::context_now() const {
@@ -45,12 +33,6 @@ void Callback::let_wait() const {
         "spin_once() and spin_until_future_complete() have no worker that would go on with it)");
   }
   context->let_wait();
-}
-
-// A coroutine that did not wait is counted by execute().
-void Callback::coroutine_ended() {
-  redag::runtime::RunningJob &running = *redag::runtime::RunningJob::current();
-  if (running.waiting != nullptr) count_job(running, running.waiting->job.release);
 }
 
 Callback &this_callback() {

@@ -1,9 +1,8 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Callback represents one callback of a node as a task, and measures its jobs. Each kind of entity (timer,
-// subscription, ...) has a class of its own, in its own file; entities.hpp makes them. A callback owns no entity: nodes
-// can be destroyed at any time.
+// Callback represents one callback of a node as a task. Each kind of entity (timer, subscription, ...) has a class of
+// its own, in its own file; entities.hpp makes them. A callback owns no entity: nodes can be destroyed at any time.
 //
 // Threads: workers call execute(); any thread may call the rest. Lock order: the callers' locks, lock_, the timer
 // queue's, the engine's. Functions of rclcpp that take locks are never called with lock_ held.
@@ -18,7 +17,6 @@
 
 #include "entities/executor_context.hpp"
 #include "entities/wait_set_member.hpp"
-#include "redag/base/histogram.hpp"
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/pi_mutex.hpp"
 #include "redag/engine/coroutine_body.hpp"
@@ -58,8 +56,6 @@ class Callback : public TimerQueue::Timer,
   void let_wait() const;
   /// See ExecutorContext.
   [[nodiscard]] redag::runtime::DeviceHandle device(const std::string &name) const;
-  /// Called at the end of a job's coroutine, in the job.
-  void coroutine_ended();
   /// True if the middleware takes messages back when the callback returns.
   [[nodiscard]] virtual bool lends_messages() const { return false; }
 
@@ -90,9 +86,8 @@ class Callback : public TimerQueue::Timer,
   [[nodiscard]] TaskId task() const { return task_; }
 
   void set_deadline(Duration deadline) { deadline_.store(deadline, std::memory_order_relaxed); }
-  [[nodiscard]] const redag::Histogram &response() const { return response_; }
-  [[nodiscard]] const redag::Histogram &execution() const { return execution_; }
-  [[nodiscard]] std::uint64_t late() const { return late_.load(std::memory_order_relaxed); }
+  /// Releases for which there was nothing to execute, because an earlier job came too late.
+  [[nodiscard]] virtual std::uint64_t lost() const { return 0; }
 
   /// Destroys `object` with this callback: after detach(), when its jobs in progress have ended.
   void keep_until_done(std::shared_ptr<void> object) { kept_until_done_ = std::move(object); }
@@ -103,7 +98,6 @@ class Callback : public TimerQueue::Timer,
 
   /// Leaves the executor, as part of detach(). The caller destroys the result without a lock.
   [[nodiscard]] std::shared_ptr<ExecutorContext> leave() REDAG_REQUIRES(lock_);
-  void count_late() { late_.fetch_add(1, std::memory_order_relaxed); }
   [[nodiscard]] redag::runtime::Engine &engine() const { return engine_; }
   [[nodiscard]] Duration deadline() const { return deadline_.load(std::memory_order_relaxed); }
 
@@ -118,7 +112,6 @@ class Callback : public TimerQueue::Timer,
   [[nodiscard]] virtual bool run(Time release) = 0;
   /// Throws redag::WaitCancelled once detached.
   [[nodiscard]] std::shared_ptr<ExecutorContext> context_now() const REDAG_EXCLUDES(lock_);
-  void count_job(redag::runtime::RunningJob &running, Time release);
 
   const redag::CallbackId id_;
   redag::runtime::Engine &engine_;
@@ -126,11 +119,7 @@ class Callback : public TimerQueue::Timer,
   bool in_wait_set_ = false;
   std::shared_ptr<ExecutorContext> context_ REDAG_GUARDED_BY(lock_);
   std::shared_ptr<void> kept_until_done_;  // guarded by Registry::collect_lock_
-
   std::atomic<Duration> deadline_{redag::kNever};
-  std::atomic<std::uint64_t> late_{0};
-  redag::Histogram response_;
-  redag::Histogram execution_;
 };
 
 /// The callback whose job the calling thread runs. Throws std::logic_error if there is none that may wait.

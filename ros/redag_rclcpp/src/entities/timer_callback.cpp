@@ -95,6 +95,7 @@ class TimerCallback final : public Callback {
   }
   [[nodiscard]] std::vector<TaskId> publishers() const override { return {}; }
   [[nodiscard]] Duration mean_interval() const override { return 0; }
+  [[nodiscard]] std::uint64_t lost() const override { return lost_.load(std::memory_order_relaxed); }
 
   Time expire(Time now, std::vector<Release> &releases, std::vector<Release> &missed) override;
   void skipped(redag::Reason reason) noexcept override {
@@ -141,8 +142,9 @@ class TimerCallback final : public Callback {
   rclcpp::JumpHandler::SharedPtr clock_watch_;       // reports that simulated time begins or ends
   Time last_release_ = kNever;                       // guarded by the timer queue's lock
   std::atomic<bool> uncalled_{false};                // released, and not called since
-  std::atomic<bool> restarted_{false};               // the timer's grid begins anew
-  std::atomic<Duration> known_period_;               // to the scheduler, or soon
+  std::atomic<std::uint64_t> lost_{0};
+  std::atomic<bool> restarted_{false};  // the timer's grid begins anew
+  std::atomic<Duration> known_period_;  // to the scheduler, or soon
 };
 
 bool TimerCallback::connect() {
@@ -270,7 +272,7 @@ bool TimerCallback::run(Time /*release*/) {
   // as well. Then the expiry is lost and counts as a miss. A job that has waited for others is called nevertheless, in
   // place of the next expiry: it stands for their data, which no later job gets.
   if (!due && (stopped || !joined_)) {
-    if (!stopped) count_late();
+    if (!stopped) lost_.fetch_add(1, std::memory_order_relaxed);
     reschedule();
     return false;
   }

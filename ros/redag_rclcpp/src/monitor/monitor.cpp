@@ -16,6 +16,7 @@
 
 #include "bounds.hpp"
 #include "compat.hpp"
+#include "live_page.hpp"
 #include "rclcpp/exceptions.hpp"
 #include "rclcpp/logging.hpp"
 #include "redag/base/lock_guard.hpp"
@@ -114,6 +115,7 @@ class Monitor::Impl : public std::enable_shared_from_this<Impl> {
   std::optional<Bounds> bounds_ REDAG_GUARDED_BY(bounds_lock_);  // set if has_bounds_
 
   // Used by the monitor's thread, and by finish() once that thread has ended.
+  std::unique_ptr<LivePage> live_;
   Diagnoser diagnoser_;
   TraceKeeper keeper_;
   RunRecord record_;
@@ -131,8 +133,10 @@ void Monitor::Impl::start() {
   RCLCPP_INFO(node_->get_logger(), "a callback without a stated period has the priority of one of %s%s",
               redag::humanize_duration(options_.default_period.count()).c_str(),
               executor_.learning_done() ? "" : ", until its rate is learned");
-  RCLCPP_INFO(node_->get_logger(), "'redag top' shows the callbacks while they run, %s and %s report their misses",
-              diagnostics_->get_topic_name(), metrics_->get_topic_name());
+  RCLCPP_INFO(node_->get_logger(), "%s%s and %s report the misses of callbacks",
+              options_.live ? "'redag top' shows the callbacks while they run, " : "", diagnostics_->get_topic_name(),
+              metrics_->get_topic_name());
+  if (options_.live) live_ = std::make_unique<LivePage>(executor_);
   if (has_bounds_ || !options_.trace.empty() || options_.period.count() > 0) thread_ = std::thread([this] { main(); });
 }
 
@@ -202,7 +206,7 @@ redag::Result<std::string> Monitor::Impl::save(const std::string &path) const {
   if (path.empty()) return redag::make_error("parameter 'save_path' is empty", "set it to the path of a file");
   const std::string absolute = std::filesystem::absolute(path).lexically_normal().string();
   std::set<std::string> configured;
-  for (const CallbackStats &callback : executor_.stats()) configured.insert(callback.dag);
+  for (const CallbackStats &callback : executor_.stats(false)) configured.insert(callback.dag);
   redag::Workload learned = executor_.learned();
   drop_idle_tasks(learned, configured);
   if (learned.dags.empty()) return redag::make_error("no callback has run yet");
@@ -253,7 +257,7 @@ void Monitor::Impl::publish() {
 
 void Monitor::Impl::look_at_callbacks() {
   if (!has_bounds_) return;
-  const std::vector<CallbackStats> stats = executor_.stats();
+  const std::vector<CallbackStats> stats = executor_.stats(false);
   std::string absent;
   {
     // The analysis works on a copy: requests for figures do not wait for it.
@@ -266,7 +270,7 @@ void Monitor::Impl::look_at_callbacks() {
     absent = updated->absent();
     std::map<std::string, redag::Duration> shown;
     for (const auto &[name, bound] : updated->tasks()) shown[name] = bound.response;
-    executor_.set_live_bounds(std::move(shown));
+    if (live_) live_->set_bounds(std::move(shown));
     const redag::LockGuard guard(bounds_lock_);
     bounds_ = std::move(updated);
   }
@@ -321,6 +325,7 @@ redag::Result<void> Monitor::Impl::finish() {
     const redag::LockGuard guard(stop_lock_);
     if (std::exchange(finished_, true)) return {};
   }
+  live_.reset();
   const bool has_trace = !options_.trace.empty();
   if (has_bounds_ || has_trace) drain();
   const Snapshot last = snapshot();

@@ -40,6 +40,9 @@ MonitorOptions declare_monitor_options(rclcpp::Node &node, const ReDAGOptions &e
       reader.seconds({"metrics_period", "Seconds between two messages on /diagnostics and ~/metrics; 0: no messages",
                       "a number of seconds of at least 0"},
                      1.0, true);
+  options.live = reader.flag(
+      {"live", "Let `redag top` show the executor; costs a page of memory and two updates a second", "true or false"},
+      true);
   options.save_path =
       reader.text({"save_path", "File to which the service ~/save writes the learned workload", "the path of a file"},
                   options.save_path, false);
@@ -49,7 +52,7 @@ MonitorOptions declare_monitor_options(rclcpp::Node &node, const ReDAGOptions &e
        fmt::format("a whole number from 1 to {}", kMostTraceEvents)},
       static_cast<std::int64_t>(options.trace_events), 1, kMostTraceEvents));
   options.default_period = executor.default_period;
-  if (reader.bounds()) options.workload = executor.workload;
+  if (reader.bounds() && executor.workload) options.workload = **executor.workload;
   options.calibration = read_overheads(reader);
   return options;
 }

@@ -14,9 +14,9 @@
 #include "parameter_reader.hpp"
 #include "rclcpp/exceptions.hpp"
 #include "rclcpp/logging.hpp"
+#include "redag/derived/clusters.hpp"
 #include "redag/loader/validate.hpp"
 #include "redag/loader/workload_yaml.hpp"
-#include "redag/model/clusters.hpp"
 #include "redag/threads/threads.hpp"
 
 namespace redag_rclcpp {
@@ -82,7 +82,7 @@ void read_config(rclcpp::Node &node, ParameterReader &reader, ReDAGOptions &opti
                            "the path of a workload file (docs/workload_format.md)"};
   const std::string path = reader.text(spec, "");
   if (path.empty()) return;
-  redag::Result<redag::LoadedWorkload> loaded = redag::load_workload(path, {.wcet_optional = true});
+  redag::Result<redag::LoadedWorkload> loaded = redag::load_workload(path, {.wcet_optional = true, .waits = true});
   if (loaded) {
     // A process has one executor.
     if (auto one = redag::refuse_clusters(loaded->workload, "the ROS 2 executor"); !one) {
@@ -108,8 +108,7 @@ void read_config(rclcpp::Node &node, ParameterReader &reader, ReDAGOptions &opti
     }
   }
   if (options.preemption == redag::PreemptionMode::Auto) options.preemption = workload.platform.preemption;
-  if (options.devices.empty()) options.devices = workload.platform.devices;
-  options.workload = std::move(loaded->workload);
+  options.workload = redag::validated(std::move(loaded->workload)).value();  // the loader has found no mistake
 }
 
 bool has_all_wcets(const redag::Workload &workload) {
@@ -169,10 +168,7 @@ ReDAGOptions declare_options(rclcpp::Node &node) {
        "Warn about callbacks that are in progress for longer than these seconds, while they still run; 0: no warnings",
        "a number of seconds of at least 0"},
       0.0, true);
-  options.live = reader.flag(
-      {"live", "Let `redag top` show the executor; costs a page of memory and two updates a second", "true or false"},
-      true);
-  const bool counts_responses = reader.bounds() && options.workload && has_all_wcets(*options.workload);
+  const bool counts_responses = reader.bounds() && options.workload && has_all_wcets(**options.workload);
   if (!reader.trace().empty() || counts_responses) options.trace_capacity = kTraceCapacity;
   return options;
 }

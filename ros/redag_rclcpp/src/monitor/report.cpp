@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 
 #include "redag/base/time.hpp"
-#include "redag/base/words.hpp"
 #include "redag_analysis/metrics/assumptions.hpp"
+#include "redag_analysis/text/words.hpp"
 
 namespace redag_rclcpp {
 

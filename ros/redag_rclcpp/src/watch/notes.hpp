@@ -51,8 +51,6 @@ class Notes {
     const redag::LockGuard guard(lock_);
     return deadlocks_;
   }
-  /// The deadlocks that last, in one line; "": none.
-  [[nodiscard]] std::string alert() const;
 
   /// Keeps the first exception until throw_failure().
   void fail(std::exception_ptr exception) {
@@ -68,22 +66,11 @@ class Notes {
     if (failure) std::rethrow_exception(failure);
   }
 
-  /// Bounds on response times that the live page shows, by task name.
-  void set_live_bounds(std::map<std::string, redag::Duration> bounds) {
-    const redag::LockGuard guard(lock_);
-    live_bounds_ = std::move(bounds);
-  }
-  [[nodiscard]] std::map<std::string, redag::Duration> live_bounds() const {
-    const redag::LockGuard guard(lock_);
-    return live_bounds_;
-  }
-
  private:
   mutable redag::PiMutex lock_;
   std::vector<std::string> warnings_ REDAG_GUARDED_BY(lock_);
   std::vector<Deadlock> deadlocks_ REDAG_GUARDED_BY(lock_);
   std::exception_ptr failure_ REDAG_GUARDED_BY(lock_);
-  std::map<std::string, redag::Duration> live_bounds_ REDAG_GUARDED_BY(lock_);
 };
 
 }  // namespace redag_rclcpp

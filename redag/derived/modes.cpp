@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag/model/modes.hpp"
+#include "redag/derived/modes.hpp"
 
 #include <algorithm>
 
 #include <fmt/format.h>
 
-#include "redag/model/clusters.hpp"
+#include "redag/derived/clusters.hpp"
 
 namespace redag {
 

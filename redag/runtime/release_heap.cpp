@@ -1,11 +1,11 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag/engine/release_heap.hpp"
+#include "redag/runtime/release_heap.hpp"
 
 #include <algorithm>
 
-#include "redag/model/demand.hpp"
+#include "redag/derived/demand.hpp"
 
 namespace redag::runtime {
 

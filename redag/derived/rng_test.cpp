@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 
 #include <array>
 #include <limits>

@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag/model/demand.hpp"
+#include "redag/derived/demand.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "redag/base/rng.hpp"
-#include "redag/model/waits.hpp"
+#include "redag/derived/rng.hpp"
+#include "redag/derived/waits.hpp"
 
 namespace redag {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag/model/demand.hpp"
+#include "redag/derived/demand.hpp"
 
 #include <algorithm>
 #include <cmath>

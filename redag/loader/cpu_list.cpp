@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag/base/cpu_list.hpp"
+#include "redag/loader/cpu_list.hpp"
 
 #include <algorithm>
 #include <charconv>

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Clusters: what files and validation refuse, and the parts into which they divide a workload.
-#include "redag/model/clusters.hpp"
+#include "redag/derived/clusters.hpp"
 
 #include <algorithm>
 #include <ostream>

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag/base/words.hpp"
+#include "redag_analysis/text/words.hpp"
 
 #include <gtest/gtest.h>
 

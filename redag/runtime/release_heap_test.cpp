@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag/engine/release_heap.hpp"
+#include "redag/runtime/release_heap.hpp"
 
 #include <gtest/gtest.h>
 #include <array>
 
-#include "redag/model/demand.hpp"
+#include "redag/derived/demand.hpp"
 #include "tests/testing/builders.hpp"
 
 namespace redag::runtime {

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag/model/overheads.hpp"
+#include "redag/derived/overheads.hpp"
 
 #include <algorithm>
 #include <array>

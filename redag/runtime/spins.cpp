@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag/threads/spins.hpp"
+#include "redag/runtime/spins.hpp"
 
 #include <algorithm>
 #include <limits>

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-#include "redag/engine/release_timer.hpp"
+#include "redag/runtime/release_timer.hpp"
 
 #include <algorithm>
 #include <utility>

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Tasks whose jobs wait: their text form, its mistakes, and where a job waits for how long.
-#include "redag/model/waits.hpp"
+#include "redag/derived/waits.hpp"
 
 #include <set>
 #include <string>
@@ -11,9 +11,9 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/demand.hpp"
+#include "redag/derived/rng.hpp"
 #include "redag/loader/workload_yaml.hpp"
-#include "redag/model/demand.hpp"
 
 namespace redag {
 namespace {

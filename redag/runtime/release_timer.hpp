@@ -13,7 +13,7 @@
 #include "redag/base/pi_mutex.hpp"
 #include "redag/base/result.hpp"
 #include "redag/base/thread_annotations.hpp"
-#include "redag/engine/release_heap.hpp"
+#include "redag/runtime/release_heap.hpp"
 #include "redag/threads/release_thread.hpp"
 #include "redag/threads/threads.hpp"
 

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "redag/base/ids.hpp"
+#include "redag/derived/release_queue.hpp"
 #include "redag/engine/engine.hpp"
-#include "redag/model/release_queue.hpp"
 #include "redag/model/workload.hpp"
 
 namespace redag::runtime {
