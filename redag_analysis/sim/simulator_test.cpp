@@ -10,7 +10,7 @@
 
 #include <gtest/gtest.h>
 
-#include "redag/base/rng.hpp"
+#include "redag/derived/rng.hpp"
 
 #include "redag/sched/priority_scheduler.hpp"
 #include "tests/testing/builders.hpp"
@@ -247,6 +247,17 @@ TEST(EqualRates, AChainTakesTurnsWithATimer) {
       make_workload({make_dag("a", {{"heavy", 20, 25}}), make_dag("b", {{"source", 20}, {"sink", 0, 1, {0}}})}, 1);
   const std::vector<JobEvent> events = simulate_events(workload, 2'000 * kMs);
   for (const std::uint32_t task : {0U, 1U, 2U}) EXPECT_GE(finished(events, TaskId(task)), 35U) << task;
+}
+
+// It stays on the stack of the worker that it began on. The second worker is free for 80 % of the time.
+TEST(CooperativeJobs, CanLieUnderOthersForever) {
+  Workload workload = make_workload(
+      {make_dag("a", {{"beside", 10, 2, {}, "", 4}, {"whole", 10, 10, {}, "", 5}}), make_dag("b", {{"lo", 1000, 6}})},
+      2, PreemptionMode::Cooperative);
+  workload.dags[1].tasks[0].region = kMs;
+  EXPECT_EQ(finished(simulate_events(workload, 10'000 * kMs), TaskId(2)), 0U);
+  workload.platform.preemption = PreemptionMode::Os;
+  EXPECT_EQ(finished(simulate_events(workload, 10'000 * kMs), TaskId(2)), 10U);
 }
 
 // The worker of a job depends on unrelated tasks; the data that another job reads must not.
