@@ -43,7 +43,7 @@ Result<void> admit_by_bounds(const Workload &workload, const sched::Config &conf
   if (!task_set) return tl::unexpected<Diagnostics>(task_set.error());
   const Report report = analyze(*task_set);
   if (report.verdict == Verdict::Schedulable) return {};
-  if (!task_set->not_analysable.empty() && !task_set->has_modes) return make_error(task_set->not_analysable);
+  if (task_set->is_beyond_all()) return make_error(task_set->not_analysable);
   const std::string doubtful = doubtful_tasks(*task_set, workload, report);
   return make_error("no bound shows that every deadline is met" + (doubtful.empty() ? "" : ": " + doubtful),
                     "'redag analyze --explain TASK' shows what a bound consists of");

@@ -116,6 +116,35 @@ TEST(Bounds, ATimerWithPredecessorsWaitsForThemWhereEdgesAreExecuted) {
   EXPECT_GE(bound_of_slow(), 12 * kMillisecond);
 }
 
+TEST(Bounds, CountTheSegmentsOfTasksThatWait) {
+  const redag::Workload workload = parse(R"(
+name: test
+platform: {devices: {gpu: {slots: 1}}}
+dags:
+  - name: control
+    tasks:
+      - name: sees
+        segments: [{cpu: 1ms}, {device: gpu, for: 4ms}, {cpu: 1ms}]
+        callback: {node: /robot, timer: {period: 10ms, index: 0}}
+      - {name: slow, wcet: 2ms, callback: {node: /robot, timer: {period: 20ms, index: 1}}}
+)");
+  std::vector<CallbackStats> stats{stats_of("control.sees", 10 * kMillisecond, 0),
+                                   stats_of("control.slow", 20 * kMillisecond, 1)};
+  stats[0].waits = 1;
+  redag::sched::Config full = one_worker();
+  full.preemption = redag::sched::Preemption::Full;
+  const auto learned = [&] { return workload; };
+  Bounds bounds(workload);
+  EXPECT_TRUE(bounds.update(stats, full, learned));
+  ASSERT_EQ(bounds.tasks().count("control.sees"), 1U) << bounds.absent();
+  EXPECT_EQ(bounds.tasks().at("control.sees").response, 6 * kMillisecond);
+  EXPECT_EQ(bounds.tasks().count("control.slow"), 1U) << bounds.absent();
+  stats[0].waits = 2;
+  EXPECT_TRUE(bounds.update(stats, full, learned));
+  EXPECT_EQ(bounds.absent(),
+            "a job of control.sees waited 2 times (co_await), but the segments of its task have 1 waits");
+}
+
 TEST(Bounds, AreAnalysedAnewOnlyForOtherCallbacks) {
   const redag::Workload workload = parse(kTwoTimers);
   int asked = 0;

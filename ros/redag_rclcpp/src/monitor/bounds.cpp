@@ -37,7 +37,7 @@ bool Bounds::update(const std::vector<CallbackStats> &stats, const redag::sched:
   std::vector<std::string> now;
   for (const CallbackStats &callback : stats) {
     if (callback.dag.empty()) continue;
-    now.push_back(callback.task + " " + to_string(callback.id) + (callback.waits > 0 ? " waits" : ""));
+    now.push_back(callback.task + " " + to_string(callback.id) + fmt::format(" waits {}", callback.waits));
   }
   std::sort(now.begin(), now.end());
   if (now.empty() || now == analysed_) return false;
@@ -76,8 +76,9 @@ bool Bounds::as_executed(const std::vector<CallbackStats> &stats, const Workload
           absent_ = fmt::format("the timer of {} has a period of {}, but the workload states {}", name,
                                 redag::format_duration(period), redag::format_duration(task.period));
         }
-        if (callback.waits > 0) {
-          absent_ = fmt::format("the callback of {} waits (co_await), and the bounds do not know waits", name);
+        if (callback.waits > task.waits.size()) {
+          absent_ = fmt::format("a job of {} waited {} times (co_await), but the segments of its task have {} waits",
+                                name, callback.waits, task.waits.size());
         }
         task.group = group_of(learned, name);
       }
@@ -110,10 +111,6 @@ void Bounds::analyse(const Workload &workload, const redag::sched::Config &confi
     absent_ = to_string(task_set.error());
     return;
   }
-  if (!task_set->not_analysable.empty()) {
-    absent_ = task_set->not_analysable;
-    return;
-  }
   const redag::analysis::Report report = redag::analysis::analyze(*task_set);
   std::vector<std::string> without;
   for (const redag::TaskRef &ref : redag::flatten(workload)) {
@@ -125,7 +122,10 @@ void Bounds::analyse(const Workload &workload, const redag::sched::Config &confi
       without.push_back(name);
     }
   }
-  if (!without.empty()) absent_ = fmt::format("no sound bound for {}", fmt::join(without, ", "));
+  if (without.empty()) return;
+  absent_ = bounds_.empty() && task_set->is_beyond_all()
+                ? task_set->not_analysable
+                : fmt::format("no sound bound for {}", fmt::join(without, ", "));
 }
 
 void Bounds::count(std::span<const JobEvent> events, const std::function<std::string(redag::TaskId)> &name_of,
