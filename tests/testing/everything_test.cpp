@@ -71,10 +71,11 @@ class DemandBefore {
       for (const analysis::DeviceUse &use : task.devices) time += use.service;
       return rate_of(task) * static_cast<double>(time);
     };
-    // A cooperative job that has begun, and does not run to its end, can lie under others while a worker is free.
-    const bool is_bound_to_one =
-        set_.mode == sched::Preemption::Cooperative && (own_.region < own_.wcet - own_.waits || own_.wake_ups > 0);
-    const std::uint32_t workers = is_bound_to_one ? 1 : set_.platform.workers;
+    const bool has_one = std::any_of(set_.tasks.begin(), set_.tasks.end(), [&](const auto &task) {
+      return lies_under_others(task) && (is_own(task) || (cap > 0 && shares_dag(task)) ||
+                                         (own_.group != analysis::kNoGroup && shares_group(task)));
+    });
+    const std::uint32_t workers = has_one ? 1 : set_.platform.workers;
     if (sum(all, executes) >= workers || sum(is_own, holds) >= own_.at_once) return false;
     if (own_.group != analysis::kNoGroup && sum(shares_group, holds) >= 1) return false;
     if (cap > 0 && sum(shares_dag, holds) >= cap) return false;
@@ -94,14 +95,25 @@ class DemandBefore {
     return set_.mode == sched::Preemption::None ? task.tier : task.level;
   }
 
-  // Less urgent jobs that fill the DAG have to end first: the most urgent of these counts.
+  // A cooperative job that has begun, and does not run to its end, can lie under others while a worker is free.
+  [[nodiscard]] bool lies_under_others(const analysis::CompiledTask &task) const {
+    return set_.mode == sched::Preemption::Cooperative && (task.region < task.wcet - task.waits || task.wake_ups > 0);
+  }
+
+  // Less urgent jobs that fill the DAG, or have all threads, have to end first: the most urgent of these counts.
   [[nodiscard]] std::uint32_t last_place() const {
-    const analysis::CompiledDag &dag = set_.dags[own_.dag.value];
-    if (dag.max_active == 0) return place_of(own_);
-    std::vector<std::uint32_t> places;
-    for (const std::uint32_t t : dag.tasks) places.insert(places.end(), set_.tasks[t].at_once, place_of(set_.tasks[t]));
-    std::sort(places.rbegin(), places.rend());
-    return std::max(place_of(own_), places[dag.max_active - 1]);
+    std::uint32_t last = place_of(own_);
+    const auto look_at = [&](std::uint32_t most, auto counts) {
+      std::vector<std::uint32_t> places;
+      for (const analysis::CompiledTask &task : set_.tasks) {
+        if (counts(task)) places.insert(places.end(), task.at_once, place_of(task));
+      }
+      std::sort(places.rbegin(), places.rend());
+      if (most > 0 && most <= places.size()) last = std::max(last, places[most - 1]);
+    };
+    look_at(set_.dags[own_.dag.value].max_active, [this](const auto &task) { return task.dag == own_.dag; });
+    look_at(set_.platform.max_started, [](const auto &) { return true; });
+    return last;
   }
 
   // Releases in a nanosecond.
