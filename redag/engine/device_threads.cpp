@@ -28,11 +28,12 @@ DeviceThreads::DeviceThreads(std::span<const Device> devices)
   }
 }
 
-Result<void> DeviceThreads::start(const std::string &name, int priority, const Served &served) {
+Result<void> DeviceThreads::start(const ThreadSetup &setup, const Served &served) {
   for (const auto &thread : threads_) {
-    const std::string its_name = name + "-" + devices_[thread->device.value].name;
+    ThreadSetup its_setup = setup;
+    its_setup.name += "-" + devices_[thread->device.value].name;
     Result<ThreadHandle> started = start_thread(
-        {its_name, priority, {}}, [this, served, priority, &self = *thread] { main(self, priority, served); });
+        its_setup, [this, served, priority = setup.fifo_priority, &self = *thread] { main(self, priority, served); });
     if (!started) return tl::unexpected(started.error());
     thread->handle = *std::move(started);
     states_[thread->device.value].idle.push_back(thread.get());

@@ -48,9 +48,9 @@ class DeviceThreads {
 
   explicit DeviceThreads(std::span<const Device> devices);
 
-  /// Creates the threads, named `name`-DEVICE. They begin and end services at `priority`. Error: what the system
-  /// refused; call end().
-  [[nodiscard]] Result<void> start(const std::string &name, int priority, const Served &served);
+  /// Creates the threads, with the name of their device behind that of `setup`, whose priority is that of services as
+  /// they begin and end. Error: what the system refused; call end().
+  [[nodiscard]] Result<void> start(const ThreadSetup &setup, const Served &served);
   /// Tells the threads to end, and waits for them. None serves a job. start() can be called again.
   void end();
 

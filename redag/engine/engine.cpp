@@ -46,7 +46,7 @@ Engine::Engine(std::unique_ptr<sched::Scheduler> scheduler, EngineOptions option
   const sched::Config &config = options_.config;
   REDAG_CHECK(!os() || config.max_started >= config.workers, "mode os needs at least one thread for every processor");
   REDAG_CHECK(!os() || options_.spins == 0, "spinning threads would keep others off their processors in mode os");
-  if (options_.trace_capacity == 0) {
+  if (options_.trace_capacity == 0 && trace::tap() == nullptr) {
     const JobEventKind counted = options_.measure ? JobEventKind::Preempted : JobEventKind::Skipped;
     scheduler_->record_only({JobEventKind::Skipped, counted});
   }
@@ -62,12 +62,12 @@ Engine::~Engine() {
 
 Result<void> Engine::start() {
   std::vector<int> cpus = options_.cpus;
-  const std::vector<int> usable = usable_cpus();
+  usable_ = usable_cpus();
   if (os() && cpus.empty()) {
     // The kernel runs the m most urgent threads only if it has exactly m processors to choose from. The last ones are
     // taken, because the first ones serve most interrupts.
     const std::size_t workers = options_.config.workers;
-    if (workers <= usable.size()) cpus.assign(usable.end() - static_cast<std::ptrdiff_t>(workers), usable.end());
+    if (workers <= usable_.size()) cpus.assign(usable_.end() - static_cast<std::ptrdiff_t>(workers), usable_.end());
   }
   if (Result<void> started = start_threads(cpus); !started) {
     // No thread has a job: none starts before running_ is set.
@@ -79,7 +79,7 @@ Result<void> Engine::start() {
   Locked locked(*this);
   withdraw_if_halting(locked);
   if (os()) order_.move_releases(releases_);
-  placement_.start(cpus.empty() ? usable.size() : std::min(cpus.size(), usable.size()));
+  placement_.start(cpus.empty() ? usable_.size() : std::min(cpus.size(), usable_.size()));
   running_ = true;
   decide(locked, at);
   return {};

@@ -351,7 +351,8 @@ class Engine {
   Event idle_event_;
   SharedOrder order_;
   ReleaseThread *releases_ = nullptr;
-  bool lets_wait_ = false;  // let_wait() has succeeded
+  std::vector<int> usable_;  // where the thread that called start() may run: a worker may not run everywhere
+  bool lets_wait_ = false;   // let_wait() has succeeded
   // let_wait(): wakes jobs that sleep.
   std::unique_ptr<ReleaseThread> sleepers_;
   // let_wait(): calls of wake_all() that may still touch this engine although the woken job has ended.

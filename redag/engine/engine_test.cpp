@@ -16,6 +16,7 @@
 #include "redag/runtime/async_event.hpp"
 #include "redag/sched/priority_scheduler.hpp"
 #include "redag/threads/clock.hpp"
+#include "redag/trace/tap.hpp"
 #include "tests/testing/allocation_counter.hpp"
 #include "tests/testing/builders.hpp"
 #include "tests/testing/every_mode.hpp"
@@ -563,6 +564,32 @@ struct SkipLog final : SkipListener {
   Engine &engine;
   std::vector<Reason> reasons;
 };
+
+// As LTTng's provider, which is loaded before there is an engine.
+TEST(Engine, ATapHearsOfAllEventsWithoutATrace) {
+  static std::atomic<int> heard{0};
+  heard = 0;
+  static constexpr trace::Tap kTap{
+      [](const void *, TaskId, DagId, const Task &) noexcept {},
+      [](const void *, const JobEvent &event) noexcept { heard += event.kind == JobEventKind::Released ? 1 : 0; },
+      [](const void *, const JobEvent &, Duration) noexcept {}};
+  redag_set_tap(&kTap);
+  {
+    Workload workload = ladder(1);
+    EngineOptions options;
+    options.config.policy = workload.policy;
+    Engine engine(std::make_unique<sched::PriorityScheduler>(workload, options.config), options);
+    engine.bind(workload, {[](const Job &) { return Outcome::Finished; }});
+    engine.set_origin(monotonic_now());
+    for (int i = 0; i < 3; ++i) {
+      engine.pause();
+      engine.release(TaskId(0), engine.now());
+      EXPECT_TRUE(engine.run_one());
+    }
+  }
+  redag_set_tap(nullptr);
+  EXPECT_EQ(heard, 3);
+}
 
 TEST(Engine, AListenerIsToldOfSkippedJobsAndNotOfMissedReleases) {
   Bench bench(ladder(1), PreemptionMode::None, 1);

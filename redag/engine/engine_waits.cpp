@@ -17,9 +17,9 @@ Result<void> Engine::let_wait() {
   if (lets_wait_) return {};
   if (!sleepers_) sleepers_ = std::make_unique<ReleaseThread>([this] { return wake_sleepers(); });
   if (!wakes_) wakes_ = std::make_shared<InProgress>();
-  Result<void> started = sleepers_->start({options_.name + "-waits", options_.waits_priority, {}});
+  Result<void> started = sleepers_->start({options_.name + "-waits", options_.waits_priority, usable_});
   if (!started) return started;
-  started = devices_.start(options_.name, options_.waits_priority,
+  started = devices_.start({options_.name, options_.waits_priority, usable_},
                            [this](DeviceThread &thread, JobSlot job) { end_service(thread, job); });
   if (!started) {
     devices_.end();

@@ -51,7 +51,7 @@ struct RunningJob {
   Duration before = 0;      // processor time until then
   Duration earlier = 0;     // how long it was in progress on threads until then
   bool measured = false;    // its processor time is asked for, however short it was
-  // The next eight are unset for each job by one instruction:
+  // The next seven are unset for each job:
   bool used_wcet_low = false;     // reported to the scheduler; written under the engine's lock
   bool used_budget = false;       // the same
   bool reported = false;          // was reported overdue; written under the engine's lock

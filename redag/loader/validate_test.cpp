@@ -17,6 +17,17 @@ Workload valid() {
 
 TEST(Validate, AcceptsAValidWorkload) { EXPECT_EQ(to_string(validate(valid())), ""); }
 
+TEST(Validate, MakesWhatExecutorsTake) {
+  Workload workload = valid();
+  const Duration period = workload.dags[0].tasks[1].period;
+  workload.dags[0].tasks[1].period = 0;
+  const Result<ValidWorkload> made = validated(workload);
+  ASSERT_TRUE(made) << to_string(made.error());
+  EXPECT_EQ((*made)->dags[0].tasks[1].period, period) << "inherited";
+  workload.dags[0].tasks[0].period = 0;
+  EXPECT_FALSE(validated(workload));
+}
+
 TEST(Validate, RefusesWhatOnlyCppCanBuild) {
   Workload workload = valid();
   workload.platform.workers = 0;

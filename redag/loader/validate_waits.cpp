@@ -44,9 +44,10 @@ void check_wait(const Workload &workload, const Task &task, std::size_t index, F
 void check_waits(const Workload &workload, const Task &task, bool allowed, FindingList &findings) {
   if (task.waits.empty()) return;
   if (!allowed) {
-    findings.error(Field::Segments, {}, fmt::format("task '{}' has segments, which cannot be handled here", task.name),
-                   "'redag simulate', 'run' and 'compare' know them, with executors of ReDAG-RT; elsewhere, state "
-                   "'wcet:' in place of 'segments:'");
+    findings.error(
+        Field::Segments, {}, fmt::format("task '{}' has segments, which cannot be handled here", task.name),
+        "'redag analyze', 'simulate', 'run', 'compare' and 'tune' know them, with executors of ReDAG-RT; elsewhere, "
+        "state 'wcet:' in place of 'segments:'");
   }
   if (task.waits.size() > kMaxWaits) {
     findings.error(

@@ -49,7 +49,8 @@ ReDAGExecutor::Core::Core(const rclcpp::Context::SharedPtr &context, ReDAGOption
       tasks_(
           redag::Platform{
               .workers = setup_.config.workers, .preemption = setup_.mode.mode, .devices = devices_of(options_)},
-          setup_.config.policy, setup_.config.ties, options_.workload ? &**options_.workload : nullptr),
+          setup_.config.policy, setup_.config.ties, options_.workload ? &**options_.workload : nullptr,
+          options_.trace_capacity > 0),
       registry_(context, options_, setup_.config.workers,
                 {.engine = *engine_, .timer = timer_, .bridge = bridge_, .tasks = tasks_, .notes = notes_}),
       learning_(registry_, options_.learn.count()),
@@ -115,7 +116,7 @@ void ReDAGExecutor::Core::let_wait() {
 }
 
 redag::runtime::DeviceHandle ReDAGExecutor::Core::device(const std::string &name) const {
-  const std::vector<redag::Device> devices = devices_of(options_);
+  const std::vector<redag::Device> &devices = devices_of(options_);
   for (std::size_t d = 0; d < devices.size(); ++d) {
     if (devices[d].name == name) return {*engine_, redag::DeviceId(d)};
   }

@@ -24,8 +24,9 @@ ReDAGOptions checked(ReDAGOptions options) {
   return options;
 }
 
-std::vector<redag::Device> devices_of(const ReDAGOptions &options) {
-  return options.workload ? (*options.workload)->platform.devices : std::vector<redag::Device>();
+const std::vector<redag::Device> &devices_of(const ReDAGOptions &options) {
+  static const std::vector<redag::Device> none;
+  return options.workload ? (*options.workload)->platform.devices : none;
 }
 
 redag::runtime::Setup set_up(const ReDAGOptions &options) {

@@ -19,7 +19,7 @@ namespace redag_rclcpp {
 [[nodiscard]] ReDAGOptions checked(ReDAGOptions options);
 
 /// Those of the workload's platform.
-[[nodiscard]] std::vector<redag::Device> devices_of(const ReDAGOptions &options);
+[[nodiscard]] const std::vector<redag::Device> &devices_of(const ReDAGOptions &options);
 
 /// Throws std::runtime_error if the machine does not offer what the options ask for.
 [[nodiscard]] redag::runtime::Setup set_up(const ReDAGOptions &options);

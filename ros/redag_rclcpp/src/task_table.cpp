@@ -59,8 +59,9 @@ redag::Callback match_of(const redag::CallbackId &id) {
 
 }  // namespace
 
-TaskTable::TaskTable(redag::Platform platform, redag::PolicyKind policy, redag::Ties ties, const Workload *configured)
-    : platform_(platform), policy_(policy), ties_(ties), configured_(configured) {
+TaskTable::TaskTable(redag::Platform platform, redag::PolicyKind policy, redag::Ties ties, const Workload *configured,
+                     bool is_traced)
+    : platform_(platform), policy_(policy), ties_(ties), configured_(configured), is_traced_(is_traced) {
   if (configured != nullptr) dags_ = configured->dags;
   for (redag::Dag &dag : dags_) dag.tasks.clear();
   // A DAG for all callbacks that the workload does not name. It has no max_active, and its tasks come last among
@@ -84,6 +85,7 @@ void TaskTable::set_predecessors(TaskId task, const std::vector<TaskId> &predece
     if (edge.to != task || edge.until != redag::kNever) continue;
     if (added.erase(edge.from) == 0) edge.until = before;
   }
+  if (!is_traced_) std::erase_if(edges_, [](const auto &edge) { return edge.until != redag::kNever; });
   for (const TaskId from : added) edges_.push_back({.from = from, .to = task, .since = at, .until = redag::kNever});
 }
 
@@ -97,6 +99,7 @@ void TaskTable::drop(TaskId task) {
   const redag::LockGuard guard(lock_);
   gone.swap(entries_[task.value].callback);
   entries_[task.value].execution.reset();
+  if (!is_traced_) std::erase_if(edges_, [task](const auto &edge) { return edge.from == task || edge.to == task; });
 }
 
 std::string TaskTable::name_of(TaskId task) const {

@@ -6,13 +6,13 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "entities/callback.hpp"
+#include "redag/base/histogram.hpp"
 #include "redag/base/lock_guard.hpp"
 #include "redag/base/pi_mutex.hpp"
 #include "redag/engine/engine.hpp"
@@ -40,8 +40,10 @@ class TaskTable {
     bool learned = false;                               // its period is not the one it began with
   };
 
-  /// `platform`, `policy` and `ties` are the executor's. `configured` is the user's workload, or null.
-  TaskTable(redag::Platform platform, redag::PolicyKind policy, redag::Ties ties, const redag::Workload *configured);
+  /// `platform`, `policy` and `ties` are the executor's. `configured` is the user's workload, or null. `is_traced`:
+  /// keeps edges that have ended.
+  TaskTable(redag::Platform platform, redag::PolicyKind policy, redag::Ties ties, const redag::Workload *configured,
+            bool is_traced);
 
   /// The workload's DAGs without their tasks. The last one, "ros", is for callbacks that the workload does not name.
   [[nodiscard]] const std::vector<redag::Dag> &dags() const { return dags_; }
@@ -94,6 +96,7 @@ class TaskTable {
   const redag::PolicyKind policy_;
   const redag::Ties ties_;
   const redag::Workload *const configured_;
+  const bool is_traced_;
   std::vector<redag::Dag> dags_;
 
   mutable redag::PiMutex lock_;

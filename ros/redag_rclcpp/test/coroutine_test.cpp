@@ -24,6 +24,7 @@
 #include "mode_test.hpp"
 #include "rclcpp/rclcpp.hpp"
 #include "redag/runtime/blocking.hpp"
+#include "redag/threads/threads.hpp"
 #include "redag_analysis/metrics/check/trace_checker.hpp"
 #include "spinning.hpp"
 
@@ -379,11 +380,17 @@ dags:
         segments: [{cpu: 100us}, {device: gpu, for: 100us}, {cpu: 100us}]
         callback: {node: /node, timer: {period: 1ms, index: 0}}
 )");
+  const std::vector<int> usable = redag::runtime::usable_cpus();
+  options.workers = 1;
+  std::atomic<bool> pinned{false};
   std::atomic<int> served{0};
   std::atomic<int> rounds{0};
   std::atomic<bool> refused{false};
   timer(1ms, coroutine([&]() -> Coroutine {
-          co_await device("gpu").run([&] { ++served; });
+          co_await device("gpu").run([&] {
+            ++served;
+            pinned = pinned || redag::runtime::usable_cpus() != usable;  // as the worker is in mode os
+          });
           ++rounds;
         }));
   timer(
@@ -398,6 +405,7 @@ dags:
       new_group());
   spin_until([&] { return rounds >= 10 && refused; });
   EXPECT_GE(served, rounds);
+  EXPECT_FALSE(pinned);
 }
 
 // A synchronous call with one worker: the client is in a group of its own, and the worker is lent.

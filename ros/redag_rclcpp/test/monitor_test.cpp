@@ -17,6 +17,9 @@
 #include "log_capture.hpp"
 #include "monitor_test.hpp"
 #include "rclcpp/rclcpp.hpp"
+#include "redag/live/pages.hpp"
+#include "redag/live/reader.hpp"
+#include "redag/live/writer.hpp"
 #include "redag/loader/workload_yaml.hpp"
 #include "redag/threads/threads.hpp"
 #include "redag/trace/events_file.hpp"
@@ -207,6 +210,27 @@ TEST_F(MonitorTest, ServicesAnswer) {
   const auto refused = call("/robot/save");
   EXPECT_FALSE(refused->success);
   EXPECT_THAT(refused->message, HasSubstr("/nowhere/at/all.yaml"));
+}
+
+TEST_F(MonitorTest, SegmentsOfTheFileAreSavedAndAPageIsOptional) {
+  configure(R"(
+name: test
+dags:
+  - name: control
+    tasks: [{name: sees, segments: [{cpu: 2ms}, {wait: 3ms}, {cpu: 2ms}], callback: {node: /robot, timer: 10ms}}]
+)");
+  monitor_options_.live = false;
+  add_timer(10ms, [] { use_processor(1ms); });
+  start();
+  ASSERT_TRUE(
+      eventually([&] { return !metrics_.empty() && task_of(metrics_.back(), "control.sees")["finished"] >= 3; }));
+  EXPECT_FALSE(redag::live::read_page(redag::live::page_path(redag::live::kFolder, ::getpid(), 0)));
+  stop();
+  const redag::Result<std::string> path = monitor_->save(folder_ / "saved.yaml");
+  ASSERT_TRUE(path) << to_string(path.error());
+  const auto loaded = redag::load_workload(*path, {.wcet_optional = true, .waits = true});
+  ASSERT_TRUE(loaded) << to_string(loaded.error());
+  EXPECT_EQ(loaded->workload.dags.at(0).tasks.at(0).waits.size(), 1U);
 }
 
 TEST_F(MonitorTest, WhatIsSavedConfiguresTheNextRun) {

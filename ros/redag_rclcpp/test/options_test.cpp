@@ -37,6 +37,7 @@ dags:
   - name: control
     tasks:
       - {name: imu, wcet: 1ms, callback: {node: /imu, timer: 5ms}}
+      - {name: map, segments: [{cpu: 1ms}, {wait: 2ms}, {cpu: 1ms}], callback: {node: /map, timer: 10ms}}
 )";
 
 class OptionsTest : public ::testing::Test {
@@ -147,6 +148,7 @@ TEST_F(OptionsTest, TheWorkloadCountsWhereParametersAreAtTheirDefaults) {
   EXPECT_EQ((*from_file.workload)->name, "robot");
   EXPECT_EQ((*from_file.workload)->policy, redag::PolicyKind::Edf);
   EXPECT_EQ((*from_file.workload)->ties, redag::Ties::Fixed);
+  EXPECT_EQ((*from_file.workload)->dags[0].tasks[1].waits.size(), 1U);
   const auto config = ReDAGExecutor(from_file).as_trace({}).info.config;
   EXPECT_EQ(config.policy, redag::PolicyKind::Edf);
   EXPECT_EQ(config.ties, redag::Ties::Fixed);

@@ -51,7 +51,7 @@ struct ReDAGOptions {
 
   /// States which callback is which task of which DAG (docs/workload_format.md, `callback`). Its policy and ties decide
   /// the order. Of its platform, the executor takes the devices alone, for redag_rclcpp::device() (coroutine.hpp).
-  /// declare_options() takes the rest. Made by redag::validated().
+  /// declare_options() takes the rest. Made by redag::validated(), which is in redag::redag.
   std::optional<redag::ValidWorkload> workload{};
   /// Period of a callback whose period neither the workload nor a timer states. It decides the callback's priority
   /// until a rate is learned. Must be above 0.

@@ -25,7 +25,8 @@ namespace redag_rclcpp {
 
 struct MonitorOptions {
   std::chrono::nanoseconds period = std::chrono::seconds(1);  // between two published snapshots; 0: only on request
-  bool live = true;  // shows the executor in `redag top`: a page of shared memory, and a thread that updates it
+  /// Shows the executor in `redag top` until finish(): a page of shared memory, and a thread that updates it.
+  bool live = true;
 
   /// Folder for events.redag, jobs.csv, summary.json, trace.pftrace and metrics.json; created if missing. "": no files.
   /// Needs ReDAGOptions::trace_capacity.

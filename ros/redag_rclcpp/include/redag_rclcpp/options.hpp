@@ -15,10 +15,9 @@ namespace redag_rclcpp {
 /// config, default_period, learn, raise_middleware, lock_memory, watchdog, trace, bounds. They are read-only from then
 /// on.
 ///
-/// `config` names a workload file. The file's policy decides the order. Its platform counts where the parameter
-/// has its default. Throws
-/// rclcpp::exceptions::InvalidParameterValueException, whose text names the parameter, its value, and the allowed
-/// values. Mistakes in the workload are listed all at once, each as file:line.
+/// `config` names a workload file. The file's policy decides the order. Its platform counts where the parameter has its
+/// default. Throws rclcpp::exceptions::InvalidParameterValueException, whose text names the parameter, its value, and
+/// the allowed values. Mistakes in the workload are listed all at once, each as file:line.
 [[nodiscard]] ReDAGOptions declare_options(rclcpp::Node &node);
 
 }  // namespace redag_rclcpp

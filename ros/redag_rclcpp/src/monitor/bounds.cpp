@@ -47,7 +47,7 @@ bool Bounds::update(const std::vector<CallbackStats> &stats, const redag::sched:
   watch_ = {};
   absent_.clear();
   Workload workload;
-  if (as_executed(stats, learned(), workload)) analyse(workload, config);
+  if (as_executed(stats, learned(), config.workers, workload)) analyse(workload, config);
   for (auto &[name, bound] : bounds_) {
     // Keeps the counts of a task whose bound is the same as before.
     const auto same = before.find(name);
@@ -58,7 +58,8 @@ bool Bounds::update(const std::vector<CallbackStats> &stats, const redag::sched:
   return true;
 }
 
-bool Bounds::as_executed(const std::vector<CallbackStats> &stats, const Workload &learned, Workload &result) {
+bool Bounds::as_executed(const std::vector<CallbackStats> &stats, const Workload &learned, std::uint32_t workers,
+                         Workload &result) {
   result = workload_;
   for (redag::Dag &dag : result.dags) {
     for (Task &task : dag.tasks) {
@@ -81,6 +82,7 @@ bool Bounds::as_executed(const std::vector<CallbackStats> &stats, const Workload
                                 name, callback.waits, task.waits.size());
         }
         task.group = group_of(learned, name);
+        task.concurrency = workers;  // of a reentrant group
       }
       if (!absent_.empty()) return false;
       // Where edges are not executed, the timer alone releases its callback.
@@ -109,6 +111,11 @@ void Bounds::analyse(const Workload &workload, const redag::sched::Config &confi
   const auto task_set = redag::analysis::compile(executed->workload, executed->platform);
   if (!task_set) {
     absent_ = to_string(task_set.error());
+    return;
+  }
+  // The bounds with two criticalities let HI mode begin at once. Here it waits for a preemption point or the job's end.
+  if (task_set->has_modes) {
+    absent_ = task_set->not_analysable;
     return;
   }
   const redag::analysis::Report report = redag::analysis::analyze(*task_set);

@@ -56,7 +56,7 @@ class Bounds {
  private:
   /// Gives `workload_` as the executor runs it. False: it cannot be compared, and `absent_` says why.
   [[nodiscard]] bool as_executed(const std::vector<CallbackStats> &stats, const redag::Workload &learned,
-                                 redag::Workload &result);
+                                 std::uint32_t workers, redag::Workload &result);
   void analyse(const redag::Workload &workload, const redag::sched::Config &config);
 
   redag::Workload workload_;

@@ -61,7 +61,9 @@ void LivePage::fill(redag::live::Sample &sample) const {
     task.deadline = callback.deadline;
     const auto bound = named ? bounds_.find(callback.task) : bounds_.end();
     if (bound != bounds_.end()) task.bound = bound->second;
-    redag::runtime::fill(task, engine.figures(callback.key));
+    const redag::runtime::TaskFigures figures = engine.figures(callback.key);
+    if (figures.jobs.released < callback.jobs.released) continue;  // another callback has the key by now
+    redag::runtime::fill(task, figures);
     task.misses = callback.misses;
     if (followed.count(callback.key) > 0) task.end_to_end.reset();
     sample.tasks.push_back(std::move(task));

@@ -1,8 +1,7 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Shows an executor in `redag top`: a page of shared memory, and a thread of normal priority that updates it. Exists
-// until it is destroyed.
+// Shows an executor in `redag top`: a page of shared memory, and a thread of normal priority that updates it.
 #pragma once
 
 #include <map>
@@ -20,6 +19,8 @@ class LivePage {
  public:
   /// `executor` outlives it. If the system refuses the page, there is none, and the log says why.
   explicit LivePage(const ReDAGExecutor &executor);
+
+  [[nodiscard]] bool exists() const { return publisher_ != nullptr; }
 
   /// Bounds on response times to show, by CallbackStats::task.
   void set_bounds(std::map<std::string, redag::Duration> bounds) {

@@ -133,10 +133,10 @@ void Monitor::Impl::start() {
   RCLCPP_INFO(node_->get_logger(), "a callback without a stated period has the priority of one of %s%s",
               redag::humanize_duration(options_.default_period.count()).c_str(),
               executor_.learning_done() ? "" : ", until its rate is learned");
-  RCLCPP_INFO(node_->get_logger(), "%s%s and %s report the misses of callbacks",
-              options_.live ? "'redag top' shows the callbacks while they run, " : "", diagnostics_->get_topic_name(),
-              metrics_->get_topic_name());
   if (options_.live) live_ = std::make_unique<LivePage>(executor_);
+  RCLCPP_INFO(node_->get_logger(), "%s%s and %s report the misses of callbacks",
+              live_ && live_->exists() ? "'redag top' shows the callbacks while they run, " : "",
+              diagnostics_->get_topic_name(), metrics_->get_topic_name());
   if (has_bounds_ || !options_.trace.empty() || options_.period.count() > 0) thread_ = std::thread([this] { main(); });
 }
 
@@ -211,7 +211,7 @@ redag::Result<std::string> Monitor::Impl::save(const std::string &path) const {
   drop_idle_tasks(learned, configured);
   if (learned.dags.empty()) return redag::make_error("no callback has run yet");
   const redag::Result<void> saved =
-      redag::save_workload(learned, absolute, redag::ValidateOptions{.wcet_optional = true});
+      redag::save_workload(learned, absolute, redag::ValidateOptions{.wcet_optional = true, .waits = true});
   if (!saved) return tl::unexpected<redag::Diagnostics>(saved.error());
   return absolute;
 }

@@ -1,13 +1,12 @@
 // SPDX-FileCopyrightText: The ReDAG-RT developers
 // SPDX-License-Identifier: Apache-2.0
 
-// Notes keeps what threads of the executor tell its users: warnings, deadlocks, the first exception of a callback, and
-// bounds to show. Any thread may call it; its lock is the innermost.
+// Notes keeps what threads of the executor tell its users: warnings, deadlocks, and the first exception of a callback.
+// Any thread may call it; its lock is the innermost.
 #pragma once
 
 #include <algorithm>
 #include <exception>
-#include <map>
 #include <string>
 #include <utility>
 #include <vector>
