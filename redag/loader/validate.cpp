@@ -423,7 +423,6 @@ bool has_errors(const Diagnostics &diagnostics) {
 Result<ValidWorkload> validated(Workload workload) {
   Diagnostics findings = validate(workload, {.wcet_optional = true, .waits = true});
   if (has_errors(findings)) return tl::unexpected(std::move(findings));
-  for (Dag &dag : workload.dags) inherit_periods(dag);
   return ValidWorkload(std::move(workload));
 }
 

@@ -138,8 +138,8 @@ struct ValidateOptions {
 
 [[nodiscard]] bool has_errors(const Diagnostics &diagnostics);
 
-/// Returns the workload for an executor, with the periods that data tasks inherit. Tasks with callbacks need no wcet.
-/// Error: all findings, if one of them is an error.
+/// Returns the workload for an executor. Tasks with callbacks need no wcet. Error: all findings, if one of them is an
+/// error.
 [[nodiscard]] Result<ValidWorkload> validated(Workload workload);
 
 }  // namespace redag
