@@ -33,5 +33,5 @@ inline std::atomic<const Tap *> tap{nullptr};
 }  // namespace redag::trace
 
 /// Makes `tap`, which must stay where it is, the listener. Has a plain name, by which a loaded library finds it. An
-/// engine without a trace tells a listener that came later of skipped jobs only, and none of tasks added before.
+/// engine without a trace tells a listener that came later of skips and preemptions at most, and of no earlier task.
 extern "C" __attribute__((visibility("default"))) void redag_set_tap(const redag::trace::Tap *tap);
